@@ -213,7 +213,7 @@ def splines(n, rng):
 
 
 def one_optimum(n, rng, case):
-    """Compare solvers on one problem of BK; each gives 101 rotations of its curve."""
+    """Compare solvers on one problem of the paper (BK); each computes 101 rotations."""
     matrices, vectors = oracles.rotation_of_quaternions, textbook.minimum_acceleration_so3
 
     def bvp(**options):
@@ -232,7 +232,7 @@ def one_optimum(n, rng, case):
 
 
 def one_body(n, rng, case):
-    """Compare methods that find optimal motions of a book, for instance of least torque."""
+    """Compare methods that find optimal motions of a book, such as the motion of least torque."""
     bvp, does = textbook.minimum_torque_so3, "minimum_acceleration_so3, of the book"
     rest = np.zeros(3)
     least = _ours(case, rb.minimum_acceleration_so3, BOOK)
@@ -311,7 +311,7 @@ def _distance(truth):
 
 
 def _true_optimum(ends, G, near=None):
-    """Return 101 rotations of the curve of least torque that `solve_bvp` finds from `near`."""
+    """Return 101 rotations of the least-torque curve that `solve_bvp` finds from a guess."""
     near = near or rb.minimum_torque_so3(*ends, G)
     found, _ = oracles.stationary(("effort", G, np.eye(3)), tuple(ends), near)
     return oracles.rotation_of_quaternions(found.sol(MOMENTS)[:4])
@@ -358,8 +358,8 @@ def _by_toppra(curve, cells):
 class Contest(NamedTuple):
     """A contest, which times methods for the same task at some sizes N.
 
-    `make` takes N, a generator and the options. It returns a dict of the methods, which begins with
-    ours. The second result is a function that computes the error of a value; it may be None.
+    `make` takes N, a generator and the options. Its first result is a dict of the methods, which
+    begins with ours. Its second result is a function that computes the error of a value, or None.
     `bound` is the largest error that is allowed.
     """
 

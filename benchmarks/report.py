@@ -58,7 +58,7 @@ def read_csv(path):
 
 
 def readme_table(rows):
-    """Return the README's table of times at the largest N, divided by ours and rounded down."""
+    """Return the README's table: for the largest N, times divided by ours and rounded down."""
     text = "\n| task | time divided by ours |\n|---|---|\n"
     for words, task, case in TABLE:
         here = [row for row in rows if (row["task"], row["case"]) == (task, case)]

@@ -1,7 +1,7 @@
 """Compare the numbers that the artists of a figure hold with the CSV of the figure.
 
-A kernel that runs `record` (see conftest.py) writes all numbers that the artists of each saved
-figure hold. For an animation, it writes the numbers of all frames. The kernel stops with an error
+A kernel that runs `record` (see conftest.py) writes all numbers that the artists hold in each
+saved figure. For an animation, it writes the numbers of all frames. The kernel stops with an error
 if a figure is clipped or has no labels. `not_shown` looks for the columns of the CSV among these
 numbers. If a title or a label names a column, only the artists with this title or label count.
 """
@@ -19,7 +19,7 @@ STARTUP = """
 __import__("sys").path.insert(0, {tests!r})
 __import__("shown").record({folder!r})
 """
-# CSV columns of which not every value must appear as a number in the picture. Each entry maps a
+# In these CSV columns, not every value must appear as a number in the picture. Each entry maps a
 # pattern for "figure, column" to the share of the values that must still appear.
 SHARES = {
     # these extra columns need not be drawn
@@ -79,7 +79,7 @@ def record(folder):
 
 
 def pooled(pairs):
-    """Return a dict of the sorted numbers for each name."""
+    """Return a dict from each name to its sorted numbers."""
     pools = defaultdict(list)
     for key, values in pairs:
         pools[key].append(values)
@@ -145,7 +145,7 @@ def check_looks(fig):
         for artist in [*ax.lines, *ax.patches]:
             if artist.get_transform().contains_branch(ax.transData):
                 places = artist.get_path().transformed(artist.get_transform()).vertices
-                if ax.get_aspect() == 1:  # marks must be complete here
+                if ax.get_aspect() == 1:  # here, whole marks must be inside
                     places = artist.get_window_extent().corners()
                 assert not (places < ax.bbox.min - 1e-6).any(), artist
                 assert not (places > ax.bbox.max + 1e-6).any(), artist
@@ -187,13 +187,13 @@ def name_for(column, pools):
 
 
 def held(pool, value):
-    """Return whether the sorted pool contains a number, up to twelve digits as in the CSV."""
+    """Return whether the sorted pool contains a number; the CSV has twelve digits."""
     near = pool[np.clip(np.searchsorted(pool, value) + np.array([-1, 0]), 0, len(pool) - 1)]
     return bool((np.abs(near - value) <= 1e-11 * max(1, abs(value))).any())
 
 
 def start_recording(folder, ipython):
-    """Make kernels with the profile folder `ipython` record into `folder`; return `ipython`."""
+    """Let kernels that use the profile folder `ipython` record into `folder`; return `ipython`."""
     startup = Path(ipython) / "profile_default" / "startup"
     startup.mkdir(parents=True)
     text = STARTUP.format(tests=os.path.dirname(__file__), folder=folder)

@@ -125,7 +125,7 @@ def as_so3(x):
 
 
 def excess(R, n):
-    """Find the lowest cost by descent; return the excess of R over this cost, and this cost."""
+    """Find the least cost by descent; return the excess of R, and the least cost."""
     nodes = grid(NODES)
     weights = nodes.integral[-1]
     w = to_vector(R.mT @ np.tensordot(nodes.derivative, R, axes=1))

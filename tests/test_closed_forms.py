@@ -230,7 +230,7 @@ def test_the_end_conditions_hold_wherever_the_curve_is_defined(name, size):
 
 
 @pytest.mark.parametrize("make", [rb.exponential_cubic_long_so3, rb.bezier_long_so3])
-def test_the_long_way_round_completes_a_full_turn(make):
+def test_the_long_and_the_short_way_add_up_to_a_full_turn(make):
     """The turns are about one axis, from rest to rest or at the constant rate 1 − 2π."""
     e, t = I3[1], np.linspace(0, 1, 201)
     for w in [0 * e, (1 - 2 * np.pi) * e][: 2 if make is rb.exponential_cubic_long_so3 else 1]:
@@ -314,7 +314,7 @@ def test_legs_of_de_casteljaus_construction_never_get_longer():
 
 
 def cubic_of_quaternions(R0, R1, w0, w1, t):
-    """Return Q(t) by its definition, shape (N, 4, times); q1 has the sign that is nearer to q0."""
+    """Return Q(t) by its definition, shape (N, 4, times); of ±q1, the one nearer to q0 is used."""
     q = Rotation.from_matrix(R0.mT @ R1).as_quat(canonical=True, scalar_first=True).T
     one, (v0, v1) = np.eye(4)[:1].T, (np.insert(w, 0, 0, axis=1).T for w in (w0, w1))
     values = one + 0 * q, q, v0 / 2, oracles.quaternion_product(q, v1) / 2
@@ -412,7 +412,7 @@ def test_the_normal_cubic_satisfies_its_formula():
 
 
 def test_the_normal_cubic_of_thin_bodies_exists_except_at_the_singular_angle():
-    """About the middle axis of a plate, the map from x to y is singular at about 2.02 rad."""
+    """For turns about a plate's middle axis, the map from x to y is singular at about 2.02 rad."""
     for moments in ((1e-6, 1, 1), (1, 1, 1e-6), (1e-3, 1, 1)):
         R1 = rb.exp_so3([0.4, 0.1, 0.3])
         curve = rb.normal_cubic_so3(I3, R1, REST, REST, np.diag(moments))

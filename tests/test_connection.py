@@ -137,14 +137,14 @@ def test_a_free_body_follows_eulers_solution(a, c):
 
 @pytest.mark.source("BK (8)", "errata 13")
 def test_the_printed_geodesic_equation_is_wrong_for_the_free_body():
-    """The printed equation has Γ^i_ik for Γ^i_jk. This equation also combines the symbols Γ of the
-    frame with ä of coordinates, where ẇ is needed."""
+    """The printed equation has Γ^i_ik for Γ^i_jk. It also combines ä, which belongs to
+    coordinates, with the symbols Γ of the frame, which need ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
     gamma = christoffel(inertia, rb.BASIS_SO3)
     euler = np.linalg.solve(inertia, np.cross(inertia @ w, w))
     assert np.abs(-np.einsum("ijk,j,k->i", gamma, w, w) - euler).max() < 40 * EPS
-    # the printed j is a summation index, or stands for i
+    # the printed j may be a summation index, or may stand for i
     for reading in ("iik,j,k->i", "iik,i,k->i"):
         printed = -np.einsum(reading, gamma, w, w)
         assert np.abs(printed).max() > 0.1
@@ -152,7 +152,7 @@ def test_the_printed_geodesic_equation_is_wrong_for_the_free_body():
     _, after = rb.geodesic_flow(inertia, ONE, w, h)
     assert np.abs((after - w) / h - euler).max() < 1e-2
     ways, _ = rb.geodesic_flow(rb.METRIC_SO3, turn, w, [-h, 0, h])
-    # coordinates along the geodesic, to compute their second derivative
+    # these are coordinates along the geodesic
     before, at, ahead = rb.log_so3(ways)
     velocity, acceleration = (ahead - before) / (2 * h), (before - 2 * at + ahead) / h**2
     frame = christoffel(rb.METRIC_SO3, rb.BASIS_SO3)

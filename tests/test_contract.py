@@ -15,7 +15,7 @@ import rbcourse as rb
 
 
 def of(function, *more):
-    """Return a maker that calls `function` with the required ends and with those in `more`."""
+    """Return a function that calls `function` with its required ends and those in `more`."""
     parameters = inspect.signature(function).parameters.values()
 
     def make(ends, **given):
@@ -102,7 +102,7 @@ def jet(curve, t, own=False):
 
 
 def off(a, b):
-    """Return the largest difference, relative to the largest entry of the component or to 1."""
+    """Return the largest difference, divided by the component's largest entry if this exceeds 1."""
     others = tuple(range(np.ndim(b) - 1))
     scale = np.abs(b).max(axis=others, initial=1)
     return (np.abs(np.subtract(a, b, dtype=float)).max(axis=others, initial=0) / scale).max()
@@ -165,7 +165,7 @@ def is_the_stack_of_its_members(make):
 
 
 def has_values_at_times_of_any_shape(make):
-    """Check also empty times, more times than are evaluated together, and an empty stack."""
+    """Check times of several shapes, no times, very many times, and an empty stack."""
     for batch in ((), (2,), (0,), (2, 0)):
         curve = made(make, *batch)
         assert jet(curve, times(curve, 0)).size == 0
@@ -310,7 +310,7 @@ def lasts_as_long_as_it_is_told(make):
 
 
 def altered(name, change):
-    """Return a maker of projected cubics whose method `name` is replaced by `change`."""
+    """Return a function that makes projected cubics with a method replaced by `change`."""
 
     def make(R0, R1, w0, w1):
         curve = copy(cubic(R0, R1, w0, w1))
@@ -327,7 +327,9 @@ def scaled(order, by):
     return altered("__call__", lambda call, c, t, k=0: call(c, t, k) * (by if k == order else 1))
 
 
-CONTRACT = {  # for each clause, makers with faults that this clause must detect
+# For each clause of the contract, these functions make deliberately faulty curves, which this
+# clause must detect.
+CONTRACT = {
     meets_its_ends: {
         "end": lambda R0, R1, w0, w1: bezier(R0, R1 @ rb.exp_so3([0, 0, 1e-9]), w0, w1),
         "end velocity": lambda R0, R1, w0, w1: bezier(R0, R1, w0, 1.0000001 * w1),

@@ -21,7 +21,7 @@ def about_z(angle):
 
 
 def gauss(density, near=(), end=1.0):
-    """Integrate from 0 to `end`, on panels that get finer towards the ends and `near`."""
+    """Integrate from 0 to `end`; panels are finer near the ends and near the times `near`."""
     apart = 2.0 ** -np.arange(1, 42)
     cuts = np.unique([x for t in (0, 1, *near) for x in (*(t - apart), t, *(t + apart))])
     cuts = end * cuts[(cuts >= 0) & (cuts <= 1)]
@@ -78,7 +78,7 @@ def test_geodesics_cost_nothing():
 
 
 @pytest.mark.parametrize("margin", [2e-3, 1e-3, 1e-4, 1e-5, 3e-6])
-def test_the_cost_of_sharp_turns_is_integrated(margin):
+def test_the_cost_of_sharp_turns_is_accurate(margin):
     """Nearly all of the cost arises within a time of half the margin.
 
     The line is tested alone and as a leg of a chain. The breakpoints are close together where the
@@ -109,7 +109,7 @@ def late_line(when, angle):
 
 
 def cubic(when, off):
-    """Return a cubic about one axis that almost jumps: at `when`, the complex M is of order
+    """Return a cubic about one axis that almost jumps, since the complex M(`when`) is of order
     `off`."""
     h00, h01, h10, h11 = (hermite(one, np.array(when)) for one in np.eye(4))
     turn = np.exp(2.5j)
@@ -131,7 +131,10 @@ def cubic_of_quaternions(margin):
 
 
 def cayleys_cubic(short_of):
-    """Return a cubic that makes an extra turn within a time of about `short_of`²."""
+    """Return a cubic to a goal `short_of` below a half-turn.
+
+    It makes an extra turn within a time of about `short_of`².
+    """
     w0, w1, n = np.array([1.0, 0, 0]), np.array([0, 2.0, 0]), np.array([1.0, 2, 2]) / 3
     goal = n / np.tan(short_of / 2)
     rate = (w1 + np.cross(goal, w1) + goal * (goal @ w1)) / 2
@@ -150,14 +153,14 @@ def cayleys_cubic(short_of):
         *((cayleys_cubic, [short_of]) for short_of in (0.3, 1e-2, 1e-3, 1e-4)),
     ],
 )
-def test_the_cost_of_a_sudden_turn_is_integrated(make, given):
+def test_the_cost_of_a_sudden_turn_is_accurate(make, given):
     curve, near = make(*given)
     want = gauss(lambda t: 2 * squared(curve(t, 2)), near)
     assert rb.acceleration_cost(curve) == pytest.approx(want, rel=1e-8)
 
 
 @pytest.mark.parametrize("speed", [1e3, 1e12, 1e26])
-def test_the_cost_of_a_very_fast_start_is_integrated(speed):
+def test_the_cost_of_a_very_fast_start_is_accurate(speed):
     """M(t) = I + t M'(0) + … turns immediately, so the cost grows as the cube of the speed."""
     cubic = rb.projected_cubic_so3(I3, I3, [speed] * 3, REST)
     a = np.sqrt(3) * speed  # along one axis, θ = atan(a t)
@@ -314,7 +317,7 @@ def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
     ):
         off = np.abs(cost(rtol=rtol) / cost() - 1).max()
         assert off < max(rtol, 1e-10)
-        assert (off > 1e-9) == (rtol == 1e-2)  # fewer times are enough for the loose tolerance
+        assert (off > 1e-9) == (rtol == 1e-2)  # the loose tolerance needs fewer times
 
 
 def test_bad_arguments_are_refused():

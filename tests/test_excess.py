@@ -203,8 +203,8 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
 
 
 def test_the_excess_of_the_corrected_curve_grows_as_the_eighth_power():
-    """Excesses from the solver show the power only in the median. The estimate is accurate for
-    smaller values, and shows the power for each problem."""
+    """In excesses from the solver, only the median shows the power. The estimate is accurate for
+    smaller excesses, too, and shows the power for each problem."""
     (large, _), (middle, middle_one), (_, small_one) = (
         (excess, rb.excess_estimate(curves))
         for curves, excess in (

@@ -42,8 +42,8 @@ def test_every_figure_has_complete_files_and_legible_letters(name):
     assert b"/Type3" not in content.replace(b" ", b"")
     assert b"/FontFile2" in content
     assert b"CreationDate" not in content
-    # On a slide 1080 pixels high, numbers in 13.5 points are 2.5 % of the height when the white
-    # margins are cut off.
+    # Without the white margins, numbers in 13.5 points have 2.5 % of the height of a slide of 1080
+    # pixels.
     box = re.search(rb"/MediaBox \[ ?0 0 ([\d.]+) ([\d.]+)", content)
     width, height = map(float, box.groups())  # in points
     aspect = width / height
@@ -301,7 +301,9 @@ def test_the_tips_of_arms_agree_with_their_joint_angles():
 
 @pytest.mark.source("BK 1", "BK 7")
 def test_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
-    cell = 100 + 4 * 10 + 5  # 100 cells along the axis come first; this cell has 81° and 4.95 rad
+    cell = (
+        100 + 4 * 10 + 5
+    )  # the first 100 cells are along the axis; this one is at 81° and 4.95 rad
     ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
     for name, place in (("median", 49), ("ninety", 89)):
@@ -317,7 +319,7 @@ def test_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
 @pytest.mark.source("beyond BK 3", "beyond BK 6", "beyond BK 7")
 @pytest.mark.parametrize("body", body_atlas.BODIES)
 def test_a_cell_of_the_atlas_of_bodies_agrees_with_its_problems(body):
-    table, cell = body_atlas.stored("maps"), 3 * 10 + 3  # the cell has 63° and 3.15 rad
+    table, cell = body_atlas.stored("maps"), 3 * 10 + 3  # this cell is at 63° and 3.15 rad
     data = {name: column[table["body"] == body][cell] for name, column in table.items()}
     assert [data[x] for x in list(data)[1:4]] == pytest.approx([np.radians(63), 3.15, 200])
     ends = body_atlas.body_problems(200, 31).take(slice(200 * cell, 200 * cell + 200))

@@ -91,7 +91,7 @@ def test_the_figures_in_a_lesson_equal_the_stored_figures(path):
         if content == stored:
             continue
         still, fine = (Image.open(io.BytesIO(png)).convert("RGB") for png in (content, stored))
-        assert still.width < fine.width  # the still of a picture that can be turned
+        assert still.width < fine.width  # this picture can be turned
         off = np.abs(np.asarray(fine.resize(still.size), int) - np.asarray(still, int))
         assert (off.max(axis=-1) > 128).mean() < 0.01, name
 

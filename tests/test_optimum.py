@@ -294,7 +294,7 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
     assert found[0] == found[1]
 
 
-def test_the_solver_follows_a_guess():
+def test_the_solver_improves_a_guess():
     ends = random_problems(6, 42, 2.0, 4.0)[:4]
     found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)

@@ -20,7 +20,8 @@ MANY = random_problems(800, 50)
 # For these ends the short way costs 3504, and Bézier's curves cost 603 and 553.
 ASTRAY = "-.46787982 1.84514378 2.04665512  -1.84205908 -6.79718364 -1.48113244 "
 ASTRAY += "2.12409307 -7.32863165 -2.12777328"
-KNOWN = {  # rotation vector, velocities, and moments or accelerations; or an index of `MANY`
+# A key has an index of `MANY`, or a rotation vector, velocities, and moments or accelerations.
+KNOWN = {
     f"ball {ASTRAY}": "502.348",
     f"shooting {ASTRAY}": "502.348",
     "acceleration 79": "256.965743",  # found from a curve whose torque was reduced first
@@ -129,7 +130,7 @@ def cost_about_an_axis(angle, k0, k1):
 
 @pytest.mark.parametrize("speed", [6, 15, 25, 35, 45, 55])
 def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
-    """A cubic p(t) may end at σ plus any number of full turns; no such cubic may cost less."""
+    """No cubic p(t) that ends at σ plus full turns may cost less than the optimum."""
     rng, count = np.random.default_rng(speed), 30 if speed < 30 else 8
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
     k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])

@@ -63,7 +63,7 @@ def test_a_chain_meets_its_poses(leg, poses):
     assert np.abs(c(np.nextafter(TIMES[1:], -9)) - poses[1:]).max() < 200 * EPS
     assert np.abs(c.jumps(0)).max() < 200 * EPS
     assert c([], 1).shape == (0, 3 * c.size - 6)
-    many = RNG.uniform(*c.domain, size=5000)  # more times than one block holds
+    many = RNG.uniform(*c.domain, size=5000)  # these times fill more than one block
     smooth = {rb.projected_quintic_so3: 2}.get(leg, int(velocities is not None))
     inner = TIMES[1:-1]
     for order in range(3):
@@ -136,7 +136,7 @@ def test_a_chain_without_velocities_rests_at_its_ends(poses):
 
 
 def test_user_defined_functions_make_legs():
-    """The function of a leg may be a `partial`, or combine a single rotation with many paths.
+    """The function of a leg may be a `partial`, or make a single rotation for many paths.
 
     A function that takes an acceleration gets a quintic for the origin; other functions get a
     cubic.
@@ -252,7 +252,7 @@ def test_bad_paths_and_durations_are_refused(function, arguments, message):
 
 
 def test_errors_name_the_leg():
-    """With these velocities, the cubic M over a turn by 2 rad has rank 1 at its middle."""
+    """With these velocities, the cubic M for a turn of 2 rad has rank 1 at half time."""
     turn = np.array([0, 0, 2.0])
     R = rb.exp_so3([[0, 0, 0], -turn / 2, turn / 2])
     w = -4 / np.tan(1) * np.array([[0, 0, 0], [0, 0, 1], [0, 0, 1]])

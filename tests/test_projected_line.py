@@ -18,7 +18,7 @@ def test_theta_and_f_agree_with_the_corrected_formulas(name, order):
     want = np.vectorize(getattr(oracles, name))(*grid, order)
     off = np.abs(getattr(line, name)(*grid, order) - want)
     scale = np.abs(want)
-    if (name, order) == ("theta", 3):  # the error of this difference is relative to its terms
+    if (name, order) == ("theta", 3):  # rounding errors are relative to the subtracted terms
         scale += 4 * line.theta(*grid, 2) ** 2 / line.theta(*grid, 1)
     assert np.all(off <= (2 * EPS if (name, order) == ("theta", 0) else 8 * EPS * scale + 1e-60))
 

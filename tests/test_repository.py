@@ -45,7 +45,7 @@ EXTRAS = {  # each list has these extras of rbcourse and rbcourse-classroom
 
 
 def ranges_of(name):
-    """Return the requirements from which a list is made: dependencies, and extras."""
+    """Return the dependencies and the extras from which a list is made."""
     wanted = []
     for project, extras in zip((PROJECT, CLASSROOM), EXTRAS[name], strict=True):
         wanted += project["dependencies"] if name == "environment.txt" else []
@@ -78,7 +78,7 @@ def test_all_lists_pin_the_same_versions():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_each_list_has_all_requirements(name):
-    """A list and the lists before it must have all direct and indirect requirements."""
+    """Every direct or indirect requirement must be in the list or in a list before it."""
     pins = {canonical(pin.name): pin for other in NAMES for pin in PINS[other]}
     there = {canonical(pin.name) for other in NAMES[: NAMES.index(name) + 1] for pin in PINS[other]}
     ranges = ranges_of(name)

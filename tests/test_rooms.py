@@ -33,7 +33,7 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
         "rbclassroom.figures",
     },
     "rbclassroom.surveys": {"rbcourse", "rbcourse.draw"},
-    "rbclassroom.course": {"rbclassroom"},  # this part does not import the mathematics either
+    "rbclassroom.course": {"rbclassroom"},  # this part may not import `rbcourse`
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbclassroom.course", "rbcourse.draw"},
     "rbclassroom.live": {"rbclassroom.assignments"},
@@ -107,7 +107,7 @@ def faults(packages):
         inner, outer = imports(module, path, known)
         graph[module], own = inner - {module}, part(module)
         for other in sorted(inner):
-            top = other == "rbcourse" and module != other  # this imports all of the mathematics
+            top = other == "rbcourse" and module != other  # this imports every mathematical module
             if part(other) not in {own, *MAY_IMPORT[own]} or (own == "rbcourse" and top):
                 yield f"{module} imports {other}"
         libraries = LIBRARIES["rbcourse"] | LIBRARIES[own] | set(sys.stdlib_module_names)
@@ -134,8 +134,8 @@ def clients():
 
 
 def uses(text):
-    """Yield each name of `rbcourse` that a text imports or reads as an attribute, with its
-    module."""
+    """Yield the module and the name of each object of `rbcourse` that a text imports or reads as an
+    attribute."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             for alias in node.names:

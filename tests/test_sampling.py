@@ -138,7 +138,7 @@ def test_uniform_rotations_pass_the_tests():
         rb.matrix_from_quaternion(rb.sample_quaternion(4 * count, rng=1)),
         Rotation.random(count, rng=3).as_matrix(),
         ours[:count] @ np.diag([1, -1, -1]),
-        # half of the quaternions, since q and −q are one rotation
+        # half of the quaternions suffice, since q and −q are one rotation
         by_shoemake(rng.random((count, 3)) * [1, 0.5, 1]),
     ):
         assert failed(R) == set()
@@ -166,7 +166,7 @@ def test_deliberate_errors_are_detected():
 
 def test_the_angle_is_distributed_as_the_area_of_spherical_caps():
     """The distribution function is (a − sin a)/π. The relative error of this formula is a few
-    eps/a², or the error of the approximation a³/(6π)."""
+    eps/a²; for tiny a, it is the error of the approximation a³/(6π)."""
     for a in (0.1, 1.0, 2.5, np.pi):
         cap, _ = quad(lambda u: np.sin(u) ** 2, 0, a / 2)
         assert angle_law(a) == pytest.approx(cap / (np.pi / 4), rel=1e-12)

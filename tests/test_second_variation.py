@@ -43,7 +43,7 @@ def upright(what, angle):
 
 
 def hessian(curve, count=16, nodes=41, h=2e-2):
-    """Return eigenvalues of the second variation for turns η of the nodes, relative to ∫ ‖η⁽ᵏ⁾‖².
+    """Return eigenvalues of the second variation relative to ∫ ‖η⁽ᵏ⁾‖², where η turns the nodes.
 
     The second differences use only values of R exp(η̂) at the nodes.
     """
@@ -94,8 +94,8 @@ def test_the_constants_of_the_lemma_are_right():
 
 
 def test_the_second_variation_satisfies_the_bound_of_the_lemma():
-    """For 500 optima, test the spectrum of the second variation on polynomials, relative to ∫
-    ‖D²η‖²."""
+    """For 500 optima, test the eigenvalues of the second variation relative to ∫ ‖D²η‖², for
+    polynomials η."""
     nodes = grid(65)
     weights = nodes.integral[-1]
     eta, rate, bend = (

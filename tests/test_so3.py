@@ -67,7 +67,7 @@ def test_exp_of_huge_vectors_is_a_rotation_until_their_norm_overflows():
 
 
 @pytest.mark.source("BK 2.5", "errata 14")
-def test_the_printed_exponential_at_R_has_its_vector_outside_the_exponent():
+def test_the_printed_exponential_at_R_lacks_the_vector_in_the_exponent():
     R, w = oracles.exp_so3([0.5, -1, 2]), np.array([0.4, 0.1, -0.3])
     V = R @ rb.hat_so3(w)
     assert np.abs(R @ oracles.expm(R.T @ V) - R @ rb.exp_so3(w)).max() < 8 * EPS

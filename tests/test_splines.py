@@ -191,9 +191,9 @@ def test_the_optimum_agrees_with_the_textbook():
 
 
 def least_cost(t, R, bodies):
-    """Return the least cost of quaternions (p, v)/‖(p, v)‖, where p is the cubic of the ends and v
-    has a higher degree. The velocities at the rotations are free, and no Euler–Lagrange equation is
-    used."""
+    """Return the least cost of quaternions (p + v)/‖p + v‖, where p is the cubic of the ends, and
+    v is a vector of higher degree. The velocities at the rotations are free, and no
+    Euler–Lagrange equation is used."""
     h, count, free = np.diff(t), len(R), 9
     x, weight = np.polynomial.legendre.leggauss(30)
     s = (x + 1) / 2
@@ -239,7 +239,7 @@ def test_direct_minimisation_finds_no_lower_cost(bodies):
 @pytest.mark.parametrize(("degrees", "ratio"), [(30, 10), (60, 2), (90, 10), (120, 2)])
 def test_no_other_spline_costs_less_than_the_optimum(degrees, ratio):
     """All splines have the same ends. A chain whose velocities come from parabolas costs a tenth to
-    a third more."""
+    a third more than the optimum."""
     chains = []
     for seed in range(12):
         t, R = path(10, degrees, [10, seed], ratio)
@@ -334,8 +334,8 @@ def test_the_certificate_needs_a_definite_system_and_legs_that_are_minima():
 @pytest.mark.parametrize("degrees", [120, 150])
 @pytest.mark.parametrize(("name", "power"), [("of a body", 1), ("torque", 2)])
 def test_a_body_leaves_the_axis_of_its_poses_if_this_costs_less(name, power, degrees):
-    """The poses turn there and back about axis 3, from rest to rest. The cubics about this axis are
-    stationary."""
+    """The motion turns forwards and then back about axis 3, from rest to rest. The cubics about
+    this axis are stationary."""
     rest, angle = np.zeros(3), np.radians(degrees)
     R = rb.exp_so3([[0, 0, 0], [0, 0, angle], [0, 0, 0]])
     c = NATURAL[name]([0, 1, 2], R, (rest, rest))

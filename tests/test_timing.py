@@ -47,7 +47,7 @@ def trapezoid(length, v, a):
 
 
 def on_circle(angle, r, a):
-    """Return the least time from rest to rest on a circle; v² = r a sin(2s/r), until v² = r a."""
+    """Return the least time from rest to rest on a circle; v² is r a sin(2s/r) up to r a."""
     if angle > np.pi / 2:
         return LEMNISCATE * np.sqrt(r / a) + (angle - np.pi / 2) * np.sqrt(r / a)
     half = np.sqrt(r * angle / 2)
@@ -208,8 +208,8 @@ def test_used_shares_agree_with_the_torque_and_the_force():
 
 @pytest.mark.parametrize("name", SETS)
 def test_the_least_time_has_the_symmetries_of_the_problem(name):
-    """The path is moved or reversed, or its times or its unit of length are changed. Finally all
-    limits are scaled so that the motion is k times as fast."""
+    """Move or reverse the path, change its times, or change the unit of length. Finally scale all
+    limits so that the motion is k times as fast."""
     c, limits = random_chain(7), SETS[name]
     t, poses, T = c.times, c(c.times), rb.fastest(c, **limits).domain[1]
     turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # this pose turns about the vertical
@@ -261,7 +261,7 @@ def test_a_timed_curve_has_exact_derivatives(size):
         rb.acceleration_cost(timed)
 
 
-def test_limits_used_returns_the_first_time_of_a_constant_share():
+def test_limits_used_returns_the_first_time_at_the_limit():
     used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 

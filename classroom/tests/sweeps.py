@@ -16,7 +16,7 @@ def made(name):
 
 
 def sweep(name, **base):
-    """Apply each setting to an explorer with the start values and `base`; yield values and texts.
+    """Apply `base` and each setting in turn to a restarted explorer; yield values and texts.
 
     Check that each setting shows values or states why there are none. No text may contain "nan" or
     "-0".
@@ -35,7 +35,7 @@ def sweep(name, **base):
 
 def settings(explorer):
     """Yield settings. First, each control alone takes five values in its range. Then all controls
-    take extreme values, in all combinations for each pair of controls."""
+    take extreme values, so that each pair of controls takes all four combinations."""
     ranges = {name: _range(control) for name, control in explorer.controls.items()}
     for name, values in ranges.items():
         yield from ({name: value} for value in values)

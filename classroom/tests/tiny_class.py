@@ -53,7 +53,7 @@ def make_template(folder):
 
 
 def begun():
-    """Return code that reports the start of a cell's endless part; each cell has its own code."""
+    """Return code, different for each cell, that reports the start of the cell's endless part."""
     return f"open('begun-{uuid.uuid4().hex}', 'w').close()"
 
 

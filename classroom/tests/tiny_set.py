@@ -1,4 +1,4 @@
-"""A problem set of two small problems and a question in words, as a teacher writes it."""
+"""A problem set as a teacher writes it: two small problems, and one question in words."""
 
 from pathlib import Path
 

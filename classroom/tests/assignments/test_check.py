@@ -115,7 +115,7 @@ def test_the_file_is_written_even_if_answers_have_faults(hand_in, capsys, monkey
         assert words in said
     assert cell(submitted(path), "half-test").source.startswith("assert half < 1")
     slow = "took more than half of the 30 s that grading allows"
-    assert said.count(slow) == 6  # in this test, every code cell seems to be slow
+    assert said.count(slow) == 6  # in this test, every code cell counts as slow
     assert BoxedExecute().timeout == signature(check.check).parameters["seconds"].default == 30
     assert not (path.parent / "made_by_a_run").exists()
 

@@ -55,7 +55,7 @@ def square(x):
 print(os.path.exists("ps0.ipynb"), os.path.exists("seen.txt") and open("seen.txt").read())
 """
 # This answer exceeds the limit on output before its time limit begins, and then prints slowly.
-# Without the pause, fast machines would fill the memory before the time limit.
+# Without the pause, fast machines would fill the memory before the time is over.
 LOUD = f"""
 import sys, time
 from IPython.display import HTML, display

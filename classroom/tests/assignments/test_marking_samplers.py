@@ -33,7 +33,7 @@ def draws(law, n, rng):
 def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
     """By Massart's inequality, the probability of a refusal is at most 1e-6.
 
-    This test uses 20 times as many draws, so that it would detect a row that is not uniform.
+    With 20 times as many draws, this test would detect a row that is not uniform.
     """
     problem = Sampler(**LAWS[law], mistakes=())
     drawn = draws(law, 20 * problem.draws, np.random.default_rng(17))

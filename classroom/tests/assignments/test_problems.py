@@ -43,7 +43,7 @@ def compiled(text):
 
 
 def namespace(name, *further):
-    """Return the variables of the notebook after its answers and `further` code."""
+    """Run the answers of a notebook, and then `further` code; return the variables."""
     sources = {key: cell.source for key, cell in cells(name).items() if cell.cell_type == "code"}
     answers = [text for key, text in sources.items() if key.endswith("-answer")]
     space = {"__name__": "__main__"}
@@ -54,7 +54,7 @@ def namespace(name, *further):
 
 
 def head(name, slug):
-    """Return the code that precedes the solution of an answer, and the function's name."""
+    """Return the code before the solution in an answer, and the function's name."""
     text = re.split(r" *### BEGIN SOLUTION", cells(name)[f"{slug}-answer"].source)[0]
     return text, re.search(r"def (\w+)\(", text)[1]
 
@@ -206,7 +206,7 @@ def test_each_test_cell_ends_with_an_assertion(name, slug):
 
 
 @problems
-def test_hidden_tests_refuse_answers_memorised_for_the_visible_inputs(name, slug):
+def test_hidden_tests_refuse_memorised_answers(name, slug):
     if "law" in TABLES[name][slug]:
         return
     hidden = cells(name)[f"{slug}-test"].source.partition("### BEGIN HIDDEN TESTS")[2]

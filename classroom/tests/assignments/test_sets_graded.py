@@ -34,7 +34,7 @@ def regions(name, kinds):
 
 
 def points(name):
-    """Return two dicts of points: for cells with tests, and for answers in words."""
+    """Return two dicts of points: for cells with tests, and for written answers."""
     marks = [cell.metadata.nbgrader for cell in SETS[name].cells]
     graded = {mark.grade_id: mark.points for mark in marks if mark.grade}
     tests = {key: value for key, value in graded.items() if key.endswith("-test")}
@@ -138,7 +138,10 @@ def handed_out(course):
 
 @pytest.mark.parametrize("name", SETS)
 def test_no_file_of_a_handout_reveals_solutions_or_hidden_tests(course, handed_out, name):
-    """The release of each set is tested, too. Untouched answers in words need no manual grading."""
+    """The release of each set is tested, too.
+
+    Written answers that were left blank need no manual grading.
+    """
     own = {path: content.decode() for path, content in release(name, course).items()}
     files = {**handed_out, **own}
     assert any("whl/rbclassroom/assignments/marking.py" in path for path in files)

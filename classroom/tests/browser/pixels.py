@@ -18,9 +18,10 @@ def shown(canvas):
 
 
 def check_alike(drawn, want, background):
-    """Check that under 1 % of all pixels, and at most half of the moving ones, differ by over 64.
+    """Check that few pixels differ by more than 64.
 
-    Thin lines cover so few pixels that an empty canvas would pass the first condition.
+    They must be under 1 % of all pixels, and at most half as many as the moving pixels. Thin lines
+    cover so few pixels that an empty canvas would pass the first condition.
     """
     drawn, want, background = map(pixels, (drawn, want, background))
     assert drawn.shape == want.shape == background.shape

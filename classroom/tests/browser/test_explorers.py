@@ -1,4 +1,4 @@
-"""Test that explorers in JupyterLab follow the keys, and measure how fast."""
+"""Test that explorers in JupyterLab follow the keys, and measure their speed."""
 
 import re
 import statistics
@@ -70,7 +70,7 @@ def test_explorer_pictures_follow_the_keys(home, lab, page, record_property):
 
 
 def press(element, explorer, place, name, *keys):
-    """Press keys on a slider until its picture is shown; return the times of keys and pictures."""
+    """Press keys on a slider; wait for the last picture; return the times of keys and pictures."""
     element.locator(".noUi-handle").nth(place).focus()
     element.page.evaluate("keys.length = pictures.length = 0")
     for key in keys:

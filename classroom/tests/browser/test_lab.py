@@ -154,7 +154,7 @@ def test_keys_start_and_reset_an_explorer(opened, page):
     canvas.click(position={"x": 0.14 * box["width"], "y": 0.05 * box["height"]})
     refused = explorer.get_by_role("alert").get_by_text("from the base wanted")
     refused.wait_for()
-    assert "wanted" in settled(page, refused)  # the player has been prepared by now
+    assert "wanted" in settled(page, refused)  # the player is ready by now
     assert page.evaluate(SEEN) == []
 
 

@@ -99,7 +99,7 @@ def told(outputs):
     ids=lambda path: path.stem[:2],
 )
 def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
-    """Cells on the list of exceptions must really give another text. Slow cells are not run."""
+    """Cells on the list of exceptions must give a different text. Slow cells are not run."""
     notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
     stored, cells = {cell.id: cell for cell in notebook.cells}, cells_of(notebook)
     differ = set()
@@ -206,7 +206,7 @@ def test_outputs_appear_below_their_own_cells(page, address):
     for number, code in enumerate(("import time\ntime.sleep(2)\nprint('one')", "print('two')")):
         write(page, number, code)
     checks = page.get_by_role("button", name="Check")
-    for _ in range(2):  # both while Python is loading and afterwards
+    for _ in range(2):  # the first time, Python is still loading
         checks.nth(0).click()
         page.wait_for_timeout(500)
         checks.nth(1).click()

@@ -113,7 +113,7 @@ def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
     assert time.input_value() == "3"
 
 
-def test_players_show_few_steps_if_the_user_reduces_motion(timed):
+def test_players_show_few_steps_if_the_user_asks_for_less_motion(timed):
     timed.emulate_media(reduced_motion="reduce")
     timed.goto((FOLDER / "theta.html").as_uri())
     timed.clock.pause_at(HOUR)

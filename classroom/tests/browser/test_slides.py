@@ -204,7 +204,7 @@ def test_the_speaker_view_shows_the_run_sheet_and_the_answers(deck, context):
     expect(notes).to_contain_text(re.compile("Minute 0.*3"))
     expect(notes).to_contain_text("Before class")
     before = deck.evaluate(HERE)
-    while deck.evaluate(HERE) == before:  # the window may not listen yet
+    while deck.evaluate(HERE) == before:  # the slides may not follow the speaker view yet
         speaker.keyboard.press("PageDown")
         speaker.wait_for_timeout(300)
     deck.evaluate("Reveal.slide(1, 0)")

@@ -43,7 +43,7 @@ LIVING = changed(shortened, PAGE)
 
 
 def moved(states, styles, texts, data, by=1, at=-1):
-    """Move the last point; with ``at=2``, move the first polygon, which is in space."""
+    """Move the last point or, with ``at=2``, the first polygon, which is in space."""
     states[0][at] += by
 
 

@@ -89,7 +89,7 @@ def not_a_test():
 
 
 def test_an_unknown_key_is_refused(tmp_path):
-    """The keys come from one function, one constant, one test and one lesson."""
+    """The keys are found in a function, a constant, a test and a lesson."""
     for folder in ("rbcourse", "tests", "notebooks"):
         (tmp_path / folder).mkdir()
     (tmp_path / "rbcourse/so3.py").write_text(CODE, "utf-8")

@@ -248,7 +248,7 @@ KNOWN = {}
 
 
 def solved(optimum, rival, ends):
-    """Return both curves for these ends, and the costs of their rotations; results are kept."""
+    """Return both curves for these ends, and the costs of their rotations, computed once."""
     key = rival.__name__, str(ends)
     if key not in KNOWN:
         curves = optimum(*ends), rival(*ends)
@@ -257,7 +257,7 @@ def solved(optimum, rival, ends):
 
 
 def assert_compared(said, curves, costs, t, rival="projection"):
-    """Check that the texts state the costs, and the angle between the motions at these times."""
+    """Check that the texts state both costs, and the largest angle between the motions at t."""
     for name, cost in zip(("optimum", rival), costs, strict=True):
         assert reads(said[f"cost, {name}"], cost)
     ratio, (low, high) = said["their ratio"], costs
@@ -471,7 +471,7 @@ def test_the_arm_agrees_with_the_package():
 
 
 @pytest.mark.parametrize("elbow", [110.0, -70.0])
-def test_a_click_moves_the_arm_or_states_why_not(elbow):
+def test_a_click_moves_the_arm_or_gives_a_reason(elbow):
     arm = made("arm")
     arm.restart()
     arm.controls["theta1"].value = elbow

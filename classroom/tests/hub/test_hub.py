@@ -125,7 +125,7 @@ async def run_cells(address, token, sources):
             raw = await socket_.read_message()
             if isinstance(
                 raw, bytes
-            ):  # a message with buffers begins with their number and their places
+            ):  # a binary message begins with the number and the places of its parts
                 begins = [int.from_bytes(raw[k : k + 4], "big") for k in (4, 8)]
                 raw = raw[slice(*begins)]
             message = json.loads(raw)

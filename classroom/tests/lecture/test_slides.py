@@ -29,7 +29,7 @@ def text(source, slide=None, **more):
 
 
 def picture(name, slide=None, size=(400, 300), **more):
-    """Return a code cell with a black picture; each white margin takes a tenth of the size."""
+    """Return a code cell with a black picture; its white margins are a tenth of the size."""
     still = Image.new("L", size, 255)
     still.paste(0, (size[0] // 10, size[1] // 10, size[0] * 9 // 10, size[1] * 9 // 10))
     file = io.BytesIO()
@@ -215,7 +215,7 @@ def test_no_line_break_separates_a_number_from_its_unit():
     assert pages.marked(text).strip() == f"<p>{whole.translate(str.maketrans(marks))}</p>"
 
 
-def test_a_question_of_the_run_sheet_is_asked_after_the_vote(tmp_path):
+def test_a_question_about_a_poll_is_asked_after_the_vote(tmp_path):
     sheet = "| 0 | question, 1, poll 1 | Why B? | |\n| 9 | recap | And so? | |\n"
     deck = tiny(tmp_path, *poll(), text("## Recap\n\n- so"), sheet=sheet)
     asked = {slide.kind: [n for n in slide.notes if "Ask" in n] for slide in deck.shown[:4]}

@@ -36,7 +36,7 @@ def test_each_cell_has_problems_of_its_family():
 def test_random_problems_are_uniform_in_balls():
     ends = atlas.random_problems(4000, 1.5, rng=3)
     for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
-        share = (norms(x) / radius) ** 3  # this share of the ball is nearer to its centre
+        share = (norms(x) / radius) ** 3  # this share of the ball is nearer to its centre than x
         assert share.max() < 1 + 1e-9
         assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
         assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
@@ -62,14 +62,14 @@ def test_bad_sizes_and_families_are_refused():
 
 
 def about_the_identity(R0, R1, w0, w1):
-    """Return a curve that is linear in the logarithms of R0 and R1. It is reversible, but neither
-    left- nor right-invariant."""
+    """Return the curve whose logarithm goes straight from log R0 to log R1. It is reversible, but
+    neither left- nor right-invariant."""
     a, b = rb.log_so3(R0), rb.log_so3(R1)
     return lambda t: rb.exp_so3(a + t[:, None, None] * (b - a))
 
 
 @pytest.mark.source("BK Prop. 3")
-def test_moving_the_ends_moves_every_closed_form():
+def test_every_closed_form_moves_with_its_ends():
     reversible = "projection", "Bézier", "corrected", "quaternion", "about the identity"
     for way, make in {**atlas.WAYS, "about the identity": about_the_identity}.items():
         off = atlas.defects(make, SOME, rng=1)

@@ -44,7 +44,7 @@ def test_each_cell_has_its_colour(fig, family):
 
 
 def test_the_contour_is_at_an_excess_of_10_percent(fig):
-    # the exponents of ten increase with the displacement
+    # the logarithm of the excess increases with the displacement
     slope = np.repeat(np.linspace(-3, 1, 10), 10)
     table = CELLS | {f"{way} excess [1]": np.tile(10.0**slope, 2) for way in atlas.WAYS}
     atlas_figures.draw_atlas(fig, table, "along", "median")
