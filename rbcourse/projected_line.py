@@ -50,7 +50,7 @@ class ProjectedLine(AlongGeodesic):
     """
 
     timing: Progress
-    number: NDArray[np.intp]  # the index of each curve in the stack for which the timing is given
+    number: NDArray[np.intp]  # for each given timing, the index of its curve in the stack
     timed: tuple[int, ...]  # the shape of this stack
 
     @property

@@ -267,10 +267,10 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
 
     Notes
     -----
-    This is Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). The parabola of the
-    origin is in R³. The parabola of the rotation is in exponential coordinates about the middle
-    pose, so that the velocities move with the poses. At the first and the last pose, the parabola
-    of the neighbour gives the velocity. For two poses, the velocity is constant.
+    This is Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). For the origin, it
+    is a parabola in R³. For the rotation, it is a parabola in exponential coordinates about the
+    middle pose, so that the velocities move with the poses. At the first and the last pose, the
+    parabola of the neighbour gives the velocity. For two poses, the velocity is constant.
     Singular set: neighbours that are a half-turn apart (up to 1e-6) raise ValueError.
 
     Examples

@@ -96,7 +96,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
 
 
 def _find(folder: Path) -> Iterator[Upload | Row]:
-    """Yield the notebooks in a folder, in its zips, and in the zips that students handed in."""
+    """Yield the notebooks in a folder, in its zips, and in students' zips inside these."""
     for path in sorted(folder.rglob("*")):
         name = _shown(path.relative_to(folder).as_posix())
         if path.is_symlink():
