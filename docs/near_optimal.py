@@ -1,7 +1,8 @@
 """Derive the numbers in near_optimal.md exactly, and write rbcourse/leading_excess.csv.
 
 Three vectors describe a problem. The rotation vector from R0 to R1 is sigma. The end velocities,
-carried to the middle by parallel transport, are u0 and u1; d is u1 - u0, and their mean is sigma + e. A term of third order is a
+carried to the middle by parallel transport, are u0 and u1. Their difference is d = u1 - u0, and
+their mean is sigma + e. A term of third order is a
 linear combination of sigma, e and d. The code stores its three coefficients in a list. They are
 polynomials in t and in the inner products of sigma, e and d.
 """
