@@ -1,10 +1,9 @@
 """Derive the numbers in near_optimal.md exactly, and write rbcourse/leading_excess.csv.
 
-Three vectors describe a problem. The rotation vector from R0 to R1 is sigma. The end velocities,
-carried to the middle by parallel transport, are u0 and u1. Their difference is d = u1 - u0, and
-their mean is sigma + e. A term of third order is a
-linear combination of sigma, e and d. The code stores its three coefficients in a list. They are
-polynomials in t and in the inner products of sigma, e and d.
+Three vectors describe a problem. The rotation vector from R0 to R1 is sigma. Let u0 and u1 be the
+end velocities, carried to the middle by parallel transport. Their mean is sigma + e, and
+d = u1 - u0. A term of third order is a linear combination of sigma, e and d. The code stores its
+three coefficients in a list. They are polynomials in t and in the inner products of sigma, e and d.
 """
 
 import csv
@@ -22,7 +21,7 @@ TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
 one = RING.one
 sigma = [one, 0 * one, 0 * one]
 u0, u1 = [one, one, -one / 2], [one, one, one / 2]
-# Hermite's cubics: of the four values and rates at 0 and 1, one is 1 and the others are 0
+# Hermite's cubics: one end value or end rate is 1, and the other three are 0
 TO_GOAL, FIRST_RATE, LAST_RATE = 3 * t**2 - 2 * t**3, t - 2 * t**2 + t**3, t**3 - t**2
 
 

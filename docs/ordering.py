@@ -5,10 +5,10 @@ near_optimal.py. For each pair of a worse and a better closed form, ordering.csv
 
     E_worse - c E_better = sum_kl M_kl V_k . V_l + share volume^2,
 
-where volume is sigma . (e x d), share >= 0 and M is positive definite. The V_k are all products of
-an inner product with sigma, e or d, except for (sigma . sigma) sigma. So the left side is positive
-unless e = d = 0. Each product V_k . V_l is a monomial. Of the entries M_kl with the same monomial,
-all except one are free. ordering.csv contains the free entries.
+where volume is sigma . (e x d), share >= 0 and M is positive definite. Each V_k is an inner product
+times sigma, e or d; all such products occur except (sigma . sigma) sigma. So the left side is
+positive unless e = d = 0. Each product V_k . V_l is a monomial. Of the entries M_kl with the same
+monomial, all except one are free. ordering.csv contains the free entries.
 """
 
 import csv

@@ -155,13 +155,13 @@ def corrected_bezier_so3(
     Notes
     -----
     R_m = R0 exp(σ̂/2) is the half-way rotation. Among all logarithms of R0ᵀ R1, including those
-    longer than π, σ is the one nearest to the sum of the three legs of the Bézier curve.
-    The corrected curve is near-optimal for small excursions: if the excursion is multiplied by s,
-    the relative excess over the optimum is multiplied by about s⁸ (s⁴ or s² for the other closed
-    forms). The deviation δ is of third order in the excursion. Large end velocities make δ large,
-    and the curve may then cost more than the Bézier curve (see docs/near_optimal.md). The singular
-    set and the symmetries are as for `bezier_so3`. Ends are also singular if two logarithms are
-    equally near.
+    longer than π, σ is the one nearest to the sum of the three legs of the Bézier curve. The
+    corrected curve is near-optimal for small excursions: if the excursion is multiplied by s, the
+    relative excess over the optimum is multiplied by about s⁸ (for the other closed forms, by s⁴ or
+    s²). The deviation δ is of third order in the excursion. Large end velocities make δ large, and
+    the curve may then cost more than the Bézier curve (see docs/near_optimal.md). The singular set
+    and the symmetries are as for `bezier_so3`. Ends are also singular if two logarithms are equally
+    near to this sum.
 
     Examples
     --------
@@ -193,7 +193,7 @@ def bezier_legs(ends: Ends) -> Legs:
 def _slow_ends(
     R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, duration: ArrayLike
 ) -> tuple[Ends, Array, Legs]:
-    """Return the ends rescaled to unit time, the duration, and the legs of the Bézier curve."""
+    """Return the ends (rescaled to unit time), the duration, and the legs of the Bézier curve."""
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     for name, w in (("w0", ends.w0), ("w1", ends.w1)):
         angle = np.linalg.norm(w, axis=-1)
@@ -238,7 +238,7 @@ def bezier_deviation(sigma: Array, e: Array, d: Array) -> list[Array]:
 
 
 def nearest_turn(turn: Array, way: Array) -> Array:
-    """Return `turn` plus full turns, as near as possible to `way`."""
+    """Return the vector nearest to `way` that differs from `turn` by full turns."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     axis = turn / np.where(angle == 0, 1, angle)
     more = (np.sum(way * axis, axis=-1, keepdims=True) - angle) / (2 * np.pi)

@@ -131,8 +131,8 @@ def quaternion_cubic_so3(
     Singular set: R0 and R1 are a half-turn apart. The `canonical_quaternion` of R0ᵀ R1 is then
     used. The curve is also singular at times at which the cubic is zero; a call at such a time
     raises ValueError. If ``margin`` is small, the body turns by up to a full turn in a short time.
-    The error of the curve is then about eps divided by ``margin``. For its first and second
-    derivatives, eps is divided by the square and by the cube of ``margin``. The curve does not
+    The error of the curve is then about eps divided by ``margin``. The errors of its first two
+    derivatives are about eps divided by the square and the cube of ``margin``. The curve does not
     depend on the choice of frames, and the ends R1, R0, −w1, −w0 give the reversed curve.
 
     Examples

@@ -220,7 +220,7 @@ def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
 
 
 def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float = 1e-10) -> Array:
-    """Return the value of a functional for the rotation of each curve of a stack."""
+    """Return the cost of each curve's rotation, given a functional."""
 
     def density(some: Curve, t: Array, index: Index) -> Array:
         those = functional.take(index)
@@ -246,8 +246,8 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
 
     Each curve has its own panels. A panel is halved while the Clenshaw–Curtis rules with 9 and 17
     nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` returns the
-    integrand of the K curves `some`, which have the indices `index` in the stack, at the times t,
-    shape (T, K). Error messages begin with `name`.
+    integrand at the times t, shape (T, K), for the K curves `some`, whose indices in the stack are
+    `index`. Error messages begin with `name`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")
@@ -275,7 +275,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> 
                 error[part] = np.abs(value[part] - rest)
         expected = cost + np.bincount(index, value, curve.count)
         coarse = ~(error <= rtol * expected[index] + 1e-20)  # NaN counts as coarse
-        lost = coarse & (width < 256 * EPS * (start + width))  # too narrow for distinct times
+        lost = coarse & (width < 256 * EPS * (start + width))  # its times would coincide
         if lost.any() or np.count_nonzero(coarse) > _MOST + len(ends) * curve.count:
             break
         cost += np.bincount(index[~coarse], value[~coarse], curve.count)

@@ -522,7 +522,7 @@ def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
 
 
 def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
-    """Add to `points` the points of [0, 1] at distances 1/32, 1/64, …, `widths` from `times`."""
+    """Add to `points` those in [0, 1] whose distances from `times` are 1/32, 1/64, …, `widths`."""
     cuts = [points]
     for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
         apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))

@@ -52,10 +52,10 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     Notes
     -----
     Domain: small excursions. The relative error is proportional to the square of the excursion (for
-    "cumulative_bezier_so3", to the excursion). On random problems with ‖σ‖ < 0.5 and ‖w0‖, ‖w1‖ <
-    1, this error was at most 14 % for all forms except that one. The error can be larger if E is
-    much smaller than usual for ends of this size, for example if the velocities are along σ.
-    Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ.
+    "cumulative_bezier_so3", to the excursion itself). On random problems with ‖σ‖ < 0.5 and ‖w0‖,
+    ‖w1‖ < 1, this error was at most 14 % for all other forms. The error can be larger if E is much
+    smaller than usual for ends of this size, for example if the velocities are along σ. Singular
+    set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ.
 
     Examples
     --------
@@ -117,11 +117,11 @@ def excess_estimate(curve: Curve) -> Array:
     -----
     Domain: ‖w‖ times the duration is below 2.5 rad at all times, and the excess is at most 1. On
     random problems with an excess of at least 1e-8, the estimates were within 1.4 % of the excess
-    for closed forms, and within 6 % for quintics with random end accelerations. If ‖w‖ < 1 at all
-    times, these figures were 0.03 % and 1.2 %. For a smaller excess, the computed costs are not
-    accurate enough for a comparison. An excess below 1e-22 is lost in rounding. If ‖w‖ reaches
-    3π/4, the optimum may turn the other way round; the estimate is then the excess over the nearby
-    stationary curve.
+    for closed forms, and within 6 % for quintics with random end accelerations. For problems with
+    ‖w‖ < 1 at all times, these figures were 0.03 % and 1.2 %. For a smaller excess, the computed
+    costs are not accurate enough for a comparison. An excess below 1e-22 is lost in rounding. If
+    ‖w‖ reaches 3π/4, the optimum may turn the other way round; the estimate is then the excess over
+    the nearby stationary curve.
 
     Let J = ∫ ‖w'‖² dt. Let η be small, with η = η' = 0 at both ends. To second order, J of the
     curve R exp(η̂) is J − 2 g · η + η · H η. With x = η' + w × η,

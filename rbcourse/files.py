@@ -47,7 +47,7 @@ VELOCITIES = {
 }
 """The columns of a planar plan before the duration, for each frame."""
 DURATION = "duration [s]"
-_TOLERANCE = 1e-3  # for quaternion norms in files, because some programs write four decimals
+_TOLERANCE = 1e-3  # of quaternion norms; some programs write only four decimals
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 

@@ -166,7 +166,7 @@ def weighted_cubic_so3(
     ProjectedPolynomial
         The cubic of `projected_cubic_so3`, projected by `project_so_weighted` with the weight W of
         `weight_from_inertia`. It meets all four boundary conditions. The ``margin`` is the margin
-        of M W, where W is scaled to the trace 3.
+        of M W, where W is scaled to have trace 3.
 
     Notes
     -----

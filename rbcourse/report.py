@@ -220,7 +220,7 @@ def visualize(
 def interpolate_rigid_body(
     start_pose: ArrayLike, goal_pose: ArrayLike, *, steps: int = 10, shortest: bool = False
 ) -> Array:
-    """Return the path from one planar pose to another on which x, y and theta change linearly.
+    """Return a path between two planar poses; x, y and theta change linearly.
 
     Poses are (x, y, theta), and the path has the shape (steps + 1, 3). With `shortest`, the body
     turns the short way round.

@@ -27,7 +27,7 @@ Pham and Pham (TOPP-RA, IEEE Transactions on Robotics 34, 2018) find reachable a
 of joints by two passes of linear programs. Nguyen and Pham (Journal of Guidance, Control, and
 Dynamics, 2016) compute timings of rotations with bounds on angular velocities, accelerations or
 torques. For this module, only the abstracts or introductions of both papers were read. We found no
-other method for the timing of poses in which the limits are norms of vectors.
+other method that times poses under limits on the norms of vectors.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
     Returns
     -------
     dict of str to (float, float)
-        The largest share, and the first time at which the curve reaches it, up to one part in a
+        The largest share, and the first time at which the curve reaches this share to one part in a
         million. The curve is evaluated at 20,001 times and on both sides of the joints of a chain;
         a limit may be exceeded between these times.
 

@@ -17,8 +17,8 @@ loads are computed from Q W and −Qᵀ W. For the velocity of the origin in the
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
 continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
-`RotationSpline` have cubic rotation vectors and solve a nonlinear system by iteration. We found no
-linear system for the velocities in the literature.
+`RotationSpline` have cubic rotation vectors and solve a nonlinear system by iteration. In the
+literature, we found no linear system for the velocities.
 """
 
 from __future__ import annotations

@@ -132,7 +132,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
     """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
-    # the start of each axis, and the offset of its numbers (lower for x and y)
+    # each axis has a start, and an offset of its numbers
     azimuth = np.radians(ax.azim)
     left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
@@ -148,7 +148,7 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             ax.text(*place, f"{tick:g}", color="0.4", **centred)
         if name == "z":
             place = end + 0.09 * np.max(high - low) * along
-        else:  # the name is farther out than the numbers, beside the last of the widest gaps
+        else:  # beside the last of the widest gaps, and farther out than the numbers
             marks = np.array([start[k], *ticks[k], end[k]])
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]

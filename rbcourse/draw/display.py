@@ -54,8 +54,9 @@ class Display(RendererBase):
     styles : dict of tuple to int
         The number of each style. A style has the fill colour, the line (its colour, width, dashes,
         ends and corners), the clip rectangle, and the marker, whose polygons are written as in
-        `record`. Missing parts are None or empty. Lengths are in pixels, except for markers. The
-        style of a piece in space also has the number of its `Space`, its kind, and its zorder.
+        `record`. Missing parts are None or empty. Lengths are in pixels, except for markers. For a
+        piece in space, the style also has the number of the `Space`, and the kind and zorder of the
+        piece.
     rooms : list of dict
         For each `Space` of the figure: ``origin`` (where its centre appears, in pixels from the
         upper left corner) and ``view`` (azimuth and elevation, in degrees).

@@ -117,7 +117,7 @@ def show_plane(ax: Axes, paths: Iterable[Array], length: float) -> None:
 
 
 def extent_of(path: Array) -> float:
-    """Return the larger of a path's extents in x and y, or 0 if it is due to rounding.
+    """Return the larger extent of a path, in x or y, or 0 if this extent is due to rounding.
 
     An extent below 1e-12 of the largest coordinate, or below 1e-12 m, counts as rounding: the body
     stays on the spot or returns to it.

@@ -116,14 +116,15 @@ def in_order(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
 
     The eye is on one side of the plane of a face. Pieces on the other side are drawn first, then
     pieces in the plane in the order of zorder, and then pieces on the side of the eye. The pieces
-    on each side are ordered in the same way by their next face. A piece in the plane that covers
-    faces, such as an edge, is drawn with the pieces on the side of the eye. Otherwise the next
-    faces could cover half of it. The first face is the one whose plane cuts the fewest faces and
-    lines. Pieces that no face separates are drawn in the order of zorder, then of their mean depth
-    in `whole_pixels`, and then in the given order. `eye` is the direction to the eye, shape (3,).
+    on each side are ordered in the same way by their next face. A piece that lies in the plane and
+    covers faces, such as an edge, is drawn with the pieces on the side of the eye. Otherwise the
+    next faces could cover half of this piece. The first face is the one whose plane cuts the fewest
+    faces and lines. Pieces that no face separates are drawn in the order of zorder, then of their
+    mean depth in `whole_pixels`, and then in the given order. `eye` is the direction to the eye,
+    shape (3,).
     """
     drawn: list[Piece] = []
-    todo = [(False, pieces)]  # pairs (are the pieces in order?, pieces), taken from the end
+    todo = [(False, pieces)]  # True if the pieces are already in order
     while todo:
         ready, group = todo.pop()
         wall = _wall(group, eye)

@@ -1,7 +1,7 @@
 """Axes for drawings in space; lines, letters, marks and faces form one scene.
 
-Matplotlib draws one artist in space after the other, so a line is entirely in front of a body or
-behind it. In this module, all artists become pieces of a scene, which are cut where they pass
+Matplotlib draws the artists in space one after the other, so a line is entirely in front of a body
+or behind it. In this module, all artists become pieces of a scene, which are cut where they pass
 through faces.
 """
 

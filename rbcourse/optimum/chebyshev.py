@@ -31,7 +31,7 @@ class Primitives(NamedTuple):
     At the nodes x⁽ⁱ⁾ = from_ends[i] @ ends + from_k[i] @ k; no derivative of k is needed. Here x is
     the m-fold integral of k plus the polynomial of least degree that corrects the ends. The
     matrices `series_from_ends` and `series_from_k` give the Chebyshev coefficients of x⁽ⁱ⁾ in the
-    same way. The matrix `fit` maps an x whose end values are 0 to a smooth k.
+    same way. The matrix `fit` gives a smooth k for an x with zero end values.
     """
 
     from_ends: list[Array]

@@ -14,7 +14,7 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log_so3, vee
 
-LONGEST = 100.0  # rad: a length above this does not add more full turns
+LONGEST = 100.0  # rad: greater lengths add no further full turns
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
 _TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
@@ -198,7 +198,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Return R or, if cheaper, the best curve after a step times one of `SHARES`; and its cost."""
+    """Return the cheaper of R and the best curve after a step times `SHARES`, and its cost."""
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
     number = np.tile(np.arange(len(R)), len(SHARES))

@@ -90,7 +90,7 @@ class Task(NamedTuple):
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: BallStationary | Stationary
-    # for problem indices and n: the problem index of each start, and the starts at n nodes
+    # a call with problem indices and n returns the problem of each start, and the starts at n nodes
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
     nodes: int = LIMITS.nodes  # of starting curves
@@ -229,7 +229,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
 def _with_more_turns(
     task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
 ) -> tuple[Numbers, Array, Array]:
-    """Lower, on more nodes, the costs of the cheapest curves and of these curves plus full turns.
+    """Lower the costs of the cheapest curves, also with added full turns, on more nodes.
 
     The cheapest motion may turn once or twice more about the axis of a small moment. From rest to
     rest, a full turn costs at least 12 (2π)² λ, where λ is the least eigenvalue of G M G. No turn
