@@ -54,7 +54,7 @@ def configure(config: Config) -> None:
     # by default nbgrader gives no points for a cell that writes to stderr, even for a warning
     config.IgnorePattern.enabled = True
     config.IgnorePattern.pattern = r"(?s)."
-    # the feedback shows scores from the gradebook, and a run without hidden tests
+    # the feedback shows a run without hidden tests, with the scores from the gradebook
     clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
     shown = [nbgrader.GetGrades, *clear, BoxedExecute, CSSHTMLHeaderPreprocessor]
     config.GenerateFeedback.preprocessors = shown

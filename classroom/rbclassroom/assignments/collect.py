@@ -34,11 +34,11 @@ FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
 BROKEN = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
 LISTS += ["not on the roster", "missing"]
-Row = tuple[str, str, str]  # the list, the file or student, and the reason
+Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
 
 
 class Upload(NamedTuple):
-    """An upload by a student; of several, the one with the greatest first four fields is used."""
+    """An upload by a student; the greatest of several, by their first four fields, is used."""
 
     number: int  # Canvas gives larger numbers to later uploads
     date: str

@@ -257,7 +257,7 @@ def _to_do(grades: Iterable[Any]) -> list[str]:
 
 
 def _words(path: Path) -> dict[str, str]:
-    """Return those answers in an autograded notebook that are graded by hand."""
+    """Return the answers to grade by hand in an autograded notebook."""
     cells = nbformat.read(path, as_version=4).cells if path.exists() else []
     words = (cell for cell in cells if is_answer(cell) and locked_cells.marks_of(cell).get("grade"))
     return {grade_id(cell): cell.source for cell in words}

@@ -132,7 +132,7 @@ def pack(files: dict[str, bytes]) -> bytes:
     packed = io.BytesIO()
     with ZipFile(packed, "w") as archive:
         for path, data in sorted(files.items()):
-            entry = ZipInfo(path)  # by default with the earliest date
+            entry = ZipInfo(path)  # its default date is the earliest
             entry.create_system, entry.external_attr = 3, 0o644 << 16
             archive.writestr(entry, data, compress_type=ZIP_DEFLATED)
     return packed.getvalue()

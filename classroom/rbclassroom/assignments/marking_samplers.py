@@ -61,7 +61,7 @@ class Sampler:
 
     def _hint(self, rows: Rows) -> str:
         """Return the hint of the mistake with the nearest distributions, or "" if none is near."""
-        near, hint = 2.0, ""  # samples of the same distribution differ by less than two bounds
+        near, hint = 2.0, ""  # two bounds: samples of one distribution differ by less
         for mistake in self.mistakes:
             for result in mistake.results:
                 pairs = zip(rows.items(), result, strict=True)

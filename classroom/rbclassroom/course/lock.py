@@ -13,7 +13,7 @@ LISTS = {  # what each list adds to the lists before it
     "classroom/environment-book.txt": "-e ./classroom[book]\n",
     "tests/environment-test.txt": "-e .[test,lint]\n-e ./classroom[browser]\n",
 }
-SLOW = "jsonschema<4.25\n"  # the import of later releases takes 1.5 s longer
+SLOW = "jsonschema<4.25\n"  # later releases need 1.5 s more for their import
 HEAD = "# Exact versions, for every system and Python; written by 'course.py lock'.\n"
 
 

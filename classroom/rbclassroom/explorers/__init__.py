@@ -1,4 +1,4 @@
-"""Explorers: pictures in the lessons that readers change with sliders."""
+"""The explorers of the lessons: pictures that readers change with sliders."""
 
 from rbclassroom.explorers.bodies import body_explorer
 from rbclassroom.explorers.curves import flip_explorer, screw_explorer, theta_explorer

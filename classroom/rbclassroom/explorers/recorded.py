@@ -74,7 +74,7 @@ def record(
         f"{html.escape(_ABOUT + fixed)}</details>"
     )
     shown = explorer.state()
-    still = explorer.draw(shown.shown, zoom=2)  # before the artists move to other states
+    still = explorer.draw(shown.shown, zoom=2)  # drawn now, because recording moves the artists
     start = time.index % stride
     steps = explorer.steps[start::stride]
     states = [

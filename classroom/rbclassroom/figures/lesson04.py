@@ -28,8 +28,8 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
 
     For each name, `ways` has the factor, shape (3, 3), and a function or None. The function repairs
     the matrix after every 100 products. For each name, the table has the defect ‖RᵀR − I‖ before
-    the repair. The rows are for up to 60 numbers of products, equally spaced on a logarithmic
-    scale; numbers above 100 are multiples of 100 (RR 1.4).
+    the repair. Each row is for one number of products. There are up to 60 rows, equally spaced on
+    a logarithmic scale; numbers above 100 are multiples of 100 (RR 1.4).
     """
     counts = np.unique(np.geomspace(1, steps, 60).round().astype(int))
     counts = np.unique(np.where(counts > 100, counts // 100 * 100, counts))

@@ -53,7 +53,7 @@ def highest_rates(path: Curve, s: Array, limits: dict[str, float]) -> dict[str, 
 
 
 def _least(a: list[Array], b: list[Array]) -> Array:
-    """For each s, return the largest ‖a r + b‖² of all limits, at the r that makes it smallest."""
+    """Minimise the largest ‖a r + b‖² of all limits over r; return the minimum for each s."""
     if not a:
         return np.zeros(1)
     A, B = np.array(a), np.array(b)

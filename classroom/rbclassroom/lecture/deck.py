@@ -150,8 +150,9 @@ def write(
 ) -> None:
     """Write decks, crib sheets, and the files that all decks share, to a folder.
 
-    The keys of `decks` are the names of the pages. The function `ready` is applied to each page of
-    slides first. In the book, it replaces stills by files that the slides share with the lesson.
+    The keys of `decks` are the names of the pages. Each page of slides is changed by `ready`
+    before it is written. In the book, this function replaces stills by files that the slides share
+    with the lesson.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name, deck in decks.items():

@@ -196,7 +196,7 @@ def cell_table(
 
 
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:
-    """Return, over the last axis, the least y such that a fraction `share` of x is at most y.
+    """Return the least y such that a fraction `share` of x, along the last axis, is at most y.
 
     NaN does not count. The result is rounded to four digits, and to at most `decimals` decimals.
 

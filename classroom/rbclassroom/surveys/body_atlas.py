@@ -108,7 +108,7 @@ def intervals(excess: Mapping[str, Array], draws: int) -> dict[str, Array]:
     The columns are the median, the 90 % quantile, the share of the problems with an excess below a
     tenth, and the share for which the curve is the cheapest of the `CLOSED_FORMS`. If several
     curves are equally cheap, the first counts as the cheapest. For curves that are not closed
-    forms, this share is NaN. For each value there are the ends of the interval, "low" and "high".
+    forms, this share is NaN. After each value come the ends of its interval, "low" and "high".
     For quantiles, these ends are values of the sample, with ranks from the binomial distribution.
     They are NaN if the sample is too small. Intervals of shares are those of Clopper and Pearson.
     Both kinds hold for independent problems; for a sample with the same number of problems in each

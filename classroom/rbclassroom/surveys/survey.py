@@ -212,7 +212,7 @@ def processes(workers: int | None = None) -> Iterator[Executor]:
 
 
 def _end_with_parent() -> None:
-    """Ignore Ctrl-C, and end this process if its parent is killed, which no queue reports."""
+    """Ignore Ctrl-C, and end this process if its parent is killed; no queue reports this."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None
