@@ -37,20 +37,20 @@ SHARES = {
     r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,
 }
 FIGURES = Path(__file__).parents[1] / "figures"
-LETTERS = str.maketrans("ω₁₂₃", "w123")  # maps letters in labels to their spelling in columns
+LETTERS = str.maketrans("ω₁₂₃", "w123")  # labels have ω₁, columns have w1
 BAR = "<colorbar>"
 GETTERS = "get_data", "get_data_3d", "get_segments", "get_xy", "get_offsets", "get_array"
 
 
 def columns(file):
-    """Return the columns of a CSV, as text, by their names."""
+    """Return a dict of the columns of a CSV, as text."""
     with file.open(encoding="utf-8", newline="") as lines:
         header, *rows = csv.reader(lines)
     return dict(zip(header, np.array(rows).T, strict=True))
 
 
 def numbers(name):
-    """Return the columns of a committed figure by their names; columns without a unit are text."""
+    """Return a dict of the columns of a committed figure; columns without a unit are text."""
     table = columns(FIGURES / f"{name}.csv")
     return {key: x.astype(float) if key.endswith("]") else x for key, x in table.items()}
 
@@ -145,7 +145,7 @@ def check_looks(fig):
         for artist in [*ax.lines, *ax.patches]:
             if artist.get_transform().contains_branch(ax.transData):
                 places = artist.get_path().transformed(artist.get_transform()).vertices
-                if ax.get_aspect() == 1:  # here, whole marks must be inside
+                if ax.get_aspect() == 1:  # with equal scales, marks must be completely inside
                     places = artist.get_window_extent().corners()
                 assert not (places < ax.bbox.min - 1e-6).any(), artist
                 assert not (places > ax.bbox.max + 1e-6).any(), artist
@@ -177,7 +177,7 @@ def lost_columns(file, pools):
 
 
 def name_for(column, pools):
-    """Return the label, or else the title, that names a column, or "" if neither does."""
+    """Return the label that names a column, or a title if no label does, or "" if neither does."""
     plain = column.split(" [")[0]
     for name in (plain, plain.rpartition(" ")[0], plain.removesuffix(" median excess")):
         if name and f"label {name}" in pools:

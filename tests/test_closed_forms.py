@@ -172,7 +172,7 @@ def test_quaternions_of_any_norm_give_the_same_rotation():
 
 
 def cases():
-    """Return the turn, w0 and w1 of each case, by its name."""
+    """Return a dict with the turn, w0 and w1 of each case."""
     rng = np.random.default_rng(11)
     n, m = directions(2, rng)
     w0, w1, turn = np.array([2.0, -1, 3]), np.array([1.0, 4, -2]), np.array([0.3, -0.4, 1.2])

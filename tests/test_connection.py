@@ -94,8 +94,8 @@ def test_the_acceleration_is_the_tangential_part_of_the_second_derivative(G, exp
 
 @pytest.mark.source("BK 2.4", "errata 22")
 def test_the_covariant_derivative_is_along_the_velocity():
-    """The point A is not a tangent vector at A. The components of A have no rotational part, so no
-    vector would turn along A."""
+    """The point A is not a tangent vector at A: its rotational components are 0, so no vector would
+    turn along A."""
     A, S = rb.exp_se3([1, 2, 3, 4, 5, 6]), np.array([0, 0, 2.0, 3, 0, 0])
     gamma = christoffel(rb.METRIC_SE3, rb.BASIS_SE3)
     printed = rb.metrics.components_from_tangent(A, A)
@@ -137,8 +137,8 @@ def test_a_free_body_follows_eulers_solution(a, c):
 
 @pytest.mark.source("BK (8)", "errata 13")
 def test_the_printed_geodesic_equation_is_wrong_for_the_free_body():
-    """The printed equation has Γ^i_ik for Γ^i_jk. It also combines ä, which belongs to
-    coordinates, with the symbols Γ of the frame, which need ẇ."""
+    """The printed equation has Γ^i_ik instead of Γ^i_jk. It also has ä, the derivative in
+    coordinates, where the symbols Γ of the frame need ẇ."""
     turn = rb.exp_so3([0.4, -0.3, 0.5])
     inertia, w, h = turn @ INERTIA @ turn.T, np.array([1.0, 2, 3]), 1e-4
     gamma = christoffel(inertia, rb.BASIS_SO3)

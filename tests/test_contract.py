@@ -102,7 +102,7 @@ def jet(curve, t, own=False):
 
 
 def off(a, b):
-    """Return the largest difference, divided by the component's largest entry if this exceeds 1."""
+    """Return the largest difference, relative to the largest entry of its component or to 1."""
     others = tuple(range(np.ndim(b) - 1))
     scale = np.abs(b).max(axis=others, initial=1)
     return (np.abs(np.subtract(a, b, dtype=float)).max(axis=others, initial=0) / scale).max()

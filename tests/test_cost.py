@@ -109,7 +109,7 @@ def late_line(when, angle):
 
 
 def cubic(when, off):
-    """Return a cubic about one axis that almost jumps, since the complex M(`when`) is of order
+    """Return a cubic about one axis; it almost jumps, since the complex M(`when`) is of order
     `off`."""
     h00, h01, h10, h11 = (hermite(one, np.array(when)) for one in np.eye(4))
     turn = np.exp(2.5j)
@@ -122,8 +122,7 @@ def cubic(when, off):
 
 
 def cubic_of_quaternions(margin):
-    """Return a turn by 2 rad about an axis; halfway, the complex Q equals cos(1/2) + k/8
-    sin(1/2)."""
+    """Return a turn by 2 rad about an axis; the complex Q(1/2) is cos(1/2) + k/8 sin(1/2)."""
     k = 8 * (margin - np.cos(0.5)) / np.sin(0.5)
     curve = rb.quaternion_cubic_so3(I3, about_z(2.0), [0, 0, k], [0, 0, k])
     assert curve.margin == pytest.approx(margin)
@@ -131,9 +130,9 @@ def cubic_of_quaternions(margin):
 
 
 def cayleys_cubic(short_of):
-    """Return a cubic to a goal `short_of` below a half-turn.
+    """Return Cayley's cubic to a goal that is `short_of` less than a half-turn away.
 
-    It makes an extra turn within a time of about `short_of`².
+    The cubic makes an extra turn within a time of about `short_of`².
     """
     w0, w1, n = np.array([1.0, 0, 0]), np.array([0, 2.0, 0]), np.array([1.0, 2, 2]) / 3
     goal = n / np.tan(short_of / 2)

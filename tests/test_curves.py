@@ -100,7 +100,7 @@ def half_turns():
 def test_the_geodesic_over_a_half_turn_follows_rodrigues_formula():
     """The formula holds up to the end of the interval, where the tangent is infinite."""
     R0, R1, n = half_turns()
-    # the largest component of the axis is positive (the first, if several are largest)
+    # the first of the largest components of the axis is positive
     first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
     n *= np.sign(np.take_along_axis(n, first[:, None], axis=1))
     curves, cross = rb.geodesic_so3(R0, R1), rb.hat_so3(n)

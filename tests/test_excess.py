@@ -105,7 +105,7 @@ def test_the_constants_of_splines_that_turn_back_are_right():
 
 
 def test_the_ordering_of_four_closed_forms_is_proven():
-    """The proven ratios are nearly sharp: for these inner products they could not be 2 % larger."""
+    """The proven ratios are nearly sharp: ratios 2 % larger fail for these inner products."""
     projection, quaternion, cayley, bezier = (
         f"{x}_so3" for x in ("projected_cubic", "quaternion_cubic", "cayley_cubic", "bezier")
     )

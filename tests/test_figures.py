@@ -79,8 +79,8 @@ def report_fig7(t):
 
 
 def report_fig9(t):
-    """Turn at 45 degrees a second: the shoulder, then the elbow, then both in opposite
-    directions."""
+    """Turn the shoulder, then the elbow, then both in opposite directions, at 45 degrees a
+    second."""
     ways, far = ([0, 1, 1, 0], [0, 0, 1, 2]), 135 * D
     return [far * np.interp(3 * t, range(4), way) for way in ways]
 

@@ -82,7 +82,7 @@ def test_the_centre_of_mass_of_a_body_follows_a_cubic():
 @pytest.mark.source("BK 2.6", "errata 15")
 def test_only_screws_satisfy_each_definition_of_a_screw_motion():
     """A⁻¹ A' and the twist are constant, A0⁻¹ A is a subgroup, and A' is a left-invariant field.
-    The printed definitions lack the dot, and hold for every curve."""
+    The printed definitions lack the dot, so they hold for every curve."""
     found, inside = [], TIMES[1:-1]
     for curve in (SCREWS, GEODESICS):
         A, rate = curve(inside), oracles.derivative_by_differences(curve, inside)

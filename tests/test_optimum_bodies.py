@@ -20,7 +20,7 @@ MANY = random_problems(800, 50)
 # For these ends the short way costs 3504, and Bézier's curves cost 603 and 553.
 ASTRAY = "-.46787982 1.84514378 2.04665512  -1.84205908 -6.79718364 -1.48113244 "
 ASTRAY += "2.12409307 -7.32863165 -2.12777328"
-# A key has an index of `MANY`, or a rotation vector, velocities, and moments or accelerations.
+# A key has an index of `MANY`, or else a rotation vector, velocities, and moments or accelerations.
 KNOWN = {
     f"ball {ASTRAY}": "502.348",
     f"shooting {ASTRAY}": "502.348",

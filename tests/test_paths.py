@@ -136,7 +136,7 @@ def test_a_chain_without_velocities_rests_at_its_ends(poses):
 
 
 def test_user_defined_functions_make_legs():
-    """The function of a leg may be a `partial`, or make a single rotation for many paths.
+    """A leg's function may be a `partial`, or combine one rotation with many paths of the origin.
 
     A function that takes an acceleration gets a quintic for the origin; other functions get a
     cubic.
@@ -349,5 +349,5 @@ def test_a_parabola_through_three_poses_has_bessels_velocities():
         assert np.abs(chosen[i, 3:] - ROTATIONS[i].T @ slope[3:]).max() < 200 * EPS
     A = rb.pose_from_coordinates([0.4, -1, 2, 3, 1, 5])
     assert np.abs(rb.bessel_velocities(TIMES, A @ POSES) - chosen).max() < 200 * EPS
-    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])  # two poses have a constant velocity
+    w = rb.bessel_velocities([1, 3], ROTATIONS[:2])  # between two poses, the velocity is constant
     assert np.abs(w - oracles.log_so3(ROTATIONS[0].T @ ROTATIONS[1]) / 2).max() < 10 * EPS

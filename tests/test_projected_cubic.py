@@ -152,7 +152,7 @@ def test_the_polynomial_of_least_degree_has_exact_ends(count):
 @pytest.mark.parametrize("count", [2, 4, 6])
 @pytest.mark.source("BK 6")
 def test_the_polynomial_minimises_its_cost(count):
-    """The derivative in the cost is orthogonal to that of every change that keeps the ends."""
+    """If a change keeps the ends, its derivative is orthogonal to the derivative in the cost."""
     ends, order = RNG.normal(size=count), count // 2
     t = (1 + np.cos(np.pi * np.arange(9) / 8)) / 2
     best = Polynomial.fit(t, hermite(ends, t), count - 1).convert().deriv(order)

@@ -85,7 +85,7 @@ def test_the_printed_proof_of_the_projected_line_has_three_misprints():
         assert np.abs(printed - projected).max() > 0.1
     pairs = [(w, printed_eigenvectors(w))]
     along_y, turn = np.array([0, 1.2, 0]), oracles.exp_so3([0, 0.7, 0])
-    # about y the printed vectors are undefined, and any pair is valid
+    # for w along y, the printed vectors are undefined; any pair across w is valid
     with np.errstate(invalid="ignore"):
         assert np.isnan(printed_eigenvectors(along_y)).any(axis=1).all()
     pairs += [(along_y, I3[[0, 2]]), (along_y, I3[[0, 2]] @ turn.T)]

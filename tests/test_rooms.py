@@ -225,7 +225,7 @@ def test_every_public_name_is_listed_once_and_documented():
 
 
 def test_signatures_are_short_enough_to_be_read():
-    """Shift + Tab shows ArrayLike, not the types for which it stands."""
+    """Shift + Tab shows the name ArrayLike, not its long definition."""
     for name in rbcourse.__all__:
         if inspect.isroutine(getattr(rbcourse, name)) or inspect.isclass(getattr(rbcourse, name)):
             assert "Buffer" not in str(inspect.signature(getattr(rbcourse, name))), name

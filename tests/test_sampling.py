@@ -130,7 +130,7 @@ def by_shoemake(x):
 
 @pytest.mark.source("errata 18")
 def test_uniform_rotations_pass_the_tests():
-    """SciPy's rotations, negated columns, and half of the quaternions give uniform samples, too."""
+    """Rotations by SciPy, with negated columns, or from half of the quaternions pass, too."""
     count, rng = 50_000, np.random.default_rng(3)
     ours = rb.sample_rotation(4 * count, rng=1)
     for R in (

@@ -355,8 +355,7 @@ def test_a_family_of_equally_cheap_curves_is_not_definite():
 
 
 def test_a_saddle_is_not_returned_as_a_minimum():
-    """A ball takes the long way there and the long way back. The stationary curve about one axis is
-    a saddle."""
+    """A ball takes the long way there and back. The stationary curve about one axis is a saddle."""
     R = rb.exp_so3([[0, 0, 0], [0, 0, 1.0], [0, 0, 0]])
     with pytest.raises(rb.ConvergenceError, match=r"only a saddle was found$"):
         rb.minimum_acceleration_spline_so3([0, 1, 2], R, long=True)

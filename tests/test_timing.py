@@ -47,7 +47,7 @@ def trapezoid(length, v, a):
 
 
 def on_circle(angle, r, a):
-    """Return the least time from rest to rest on a circle; v² is r a sin(2s/r) up to r a."""
+    """Return the least time from rest to rest on a circle; v² is r a sin(2s/r) until it is r a."""
     if angle > np.pi / 2:
         return LEMNISCATE * np.sqrt(r / a) + (angle - np.pi / 2) * np.sqrt(r / a)
     half = np.sqrt(r * angle / 2)
@@ -177,7 +177,7 @@ def test_one_limit_is_reached_at_nearly_all_times(name):
         assert max(share for share, _ in largest.values()) == pytest.approx(used.max(), abs=1e-4)
 
 
-def test_used_shares_agree_with_the_torque_and_the_force():
+def test_shares_of_limits_agree_with_the_torque_and_the_force():
     c, r, g = random_chain(4), np.array([0.2, -0.1, 0.4]), np.array([1.0, 2, -9])
     t = np.linspace(0.2, 0.8, 7) * c.times[1]
     V, A, R = c(t, 1), c(t, 2), c(t)[:, :3, :3]
@@ -261,7 +261,7 @@ def test_a_timed_curve_has_exact_derivatives(size):
         rb.acceleration_cost(timed)
 
 
-def test_limits_used_returns_the_first_time_at_the_limit():
+def test_the_first_time_at_a_limit_is_returned():
     used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 

@@ -53,7 +53,7 @@ def make_template(folder):
 
 
 def begun():
-    """Return code, different for each cell, that reports the start of the cell's endless part."""
+    """Return code that reports, under a new name, that the endless part of a cell begins."""
     return f"open('begun-{uuid.uuid4().hex}', 'w').close()"
 
 

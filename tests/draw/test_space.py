@@ -103,7 +103,7 @@ def sampled(part):
 
 
 def covers(face, places, sight):
-    """Return, as a mask, which places appear within the outline of a face or a ball."""
+    """Return a mask of the places that appear within the outline of a face or a ball."""
     corners = sight.flat(face.places)
     (x, y), to = (np.roll(corners, -1, axis=0) - corners).T, sight.flat(places)[:, None] - corners
     if face.kind == "ball":

@@ -1,4 +1,4 @@
-"""Right samplers are almost never refused; wrong ones are refused with the reason."""
+"""Right samplers are almost never refused; refusals of wrong ones state the reason."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ def draws(law, n, rng):
 def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
     """By Massart's inequality, the probability of a refusal is at most 1e-6.
 
-    With 20 times as many draws, this test would detect a row that is not uniform.
+    The test makes 20 times as many draws, to detect a row that is not uniform.
     """
     problem = Sampler(**LAWS[law], mistakes=())
     drawn = draws(law, 20 * problem.draws, np.random.default_rng(17))
@@ -80,7 +80,7 @@ def told(problem, source, rng=1):
         ("rng.random() / 2", "These draws are not uniform. The distribution of the number"),
     ],
 )
-def test_wrong_samplers_are_refused_with_the_reason(body, said):
+def test_refusals_of_wrong_samplers_state_the_reason(body, said):
     assert told(COIN, f"def answer(rng): return {body}").startswith(said)
 
 

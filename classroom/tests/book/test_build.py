@@ -159,7 +159,7 @@ def test_the_ledger_has_a_row_for_every_key(source):
     assert "code/tests/test_projected_line.html#" in cells[3]
     assert "lessons/06_geodesics.html#s6" in cells[4]
     assert "figures.html#lesson06_chord" in cells[5]
-    # for figures of the texts, the ledger lists the pictures
+    # the ledger lists our pictures for each figure of the texts
     for key, names in {
         "bk-fig-4": ["paper_fig4a", "paper_fig4b", "paper_fig4c"],
         "bk-fig-5": ["paper_fig5a", "paper_fig5b"],

@@ -10,7 +10,7 @@ from rbclassroom.book import reference
 ROOT = Path(__file__).parents[3]
 
 
-def test_only_modules_for_maintainers_have_no_page():
+def test_all_modules_have_pages_except_those_for_maintainers():
     packages = ROOT / "rbcourse", ROOT / "classroom/rbclassroom"
     paths = {path.relative_to(package) for package in packages for path in package.rglob("*.py")}
     names = {".".join(path.with_suffix("").parts) for path in paths if path.stem[0] != "_"}

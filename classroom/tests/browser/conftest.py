@@ -16,7 +16,7 @@ from rbclassroom.course.lab import configure
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
-PATIENCE = 600_000  # this many milliseconds suffice on a slow machine
+PATIENCE = 600_000  # in milliseconds; enough for a slow machine
 QUIET = ["--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"]
 QUIET += ["--disable-background-networking", "--disable-component-update"]
 

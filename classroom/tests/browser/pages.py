@@ -43,8 +43,8 @@ def watched(context):
     # JupyterLab shows why it cannot save, and then throws this error
     meant = "is an original, and is not saved"
     page.on("pageerror", lambda error: meant in str(error) or faults.append(f"error {error}"))
-    # JupyterLab gets status 403 when it tries to save an original. Widgets report that they cannot
-    # send the values of their sliders to a kernel that has ended.
+    # JupyterLab gets status 403 when it tries to save an original. If a kernel has ended, widgets
+    # report that they cannot send it their values.
     known = re.compile("^(?!error)|403|Could not send widget sync message")
     page.on("console", lambda m: known.search(f"{m.type} {m.text}") or faults.append(m.text))
     yield page

@@ -20,8 +20,8 @@ def shown(canvas):
 def check_alike(drawn, want, background):
     """Check that few pixels differ by more than 64.
 
-    They must be under 1 % of all pixels, and at most half as many as the moving pixels. Thin lines
-    cover so few pixels that an empty canvas would pass the first condition.
+    Their number must be under 1 % of all pixels, and at most half the number of moving pixels.
+    Thin lines cover so few pixels that an empty canvas would pass the first condition.
     """
     drawn, want, background = map(pixels, (drawn, want, background))
     assert drawn.shape == want.shape == background.shape

@@ -34,7 +34,7 @@ def serving(words, folder, env, pattern):
 
 
 def _end(job):
-    """End a program and all processes that it started, within a minute."""
+    """End a program and its descendants; after a minute, kill those that still run."""
     family = [psutil.Process(job.pid)] if job.poll() is None else []
     family += [child for parent in family for child in parent.children(recursive=True)]
     for process in family:

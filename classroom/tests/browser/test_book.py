@@ -210,7 +210,7 @@ def test_the_picture_on_the_start_page_plays_once(motion, page):
     if motion == "no-preference":
         expect(play).to_have_text("❚❚")
         middle = str(int(time.get_attribute("max")) // 2)
-        # the player first passes this value, and later stops at it
+        # the player first passes the middle, and later stops there
         expect(time).to_have_value(middle)
     expect(play).to_have_text("▶")
     if motion == "no-preference":

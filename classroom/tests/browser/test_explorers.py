@@ -60,7 +60,7 @@ def test_explorer_pictures_follow_the_keys(home, lab, page, record_property):
             waits.append(pictures[0] - keys[0])
         keys, pictures = press(element, explorer, *slider, *["ArrowRight"] * 15)
         after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
-        # at most three pictures arrive late: one in transit, one being drawn, and the last one
+        # at most three pictures follow the keys: one in transit, one being drawn, and the last one
         assert len(after) <= 3, f"{name}: pictures lag behind keys that are held down"
         rate = 1000 * len(pictures) / (max(*pictures, keys[-1]) - keys[0])
         kind = "3-D" if explorer.display.rooms else "2-D"

@@ -86,8 +86,7 @@ def descriptions(path):
 
 
 def test_a_stored_lesson_is_complete_and_its_explorer_works(opened, page):
-    """The explorer reports that Python has ended. When the lesson is opened again, the explorer is
-    a still picture."""
+    """Without a kernel, the explorer shows an error; reopened, the lesson has a still picture."""
     path = opened("06_geodesics", "stored")
     stored = descriptions(path)
     assert len(stored) > 3

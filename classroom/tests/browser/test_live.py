@@ -155,8 +155,8 @@ def opened(page, address, name):
 
 
 def test_nothing_is_loaded_before_the_reader_acts(page, address):
-    """The first result loads at most 10 MB, and the first figure at most 20 MB, all from this
-    server."""
+    """The first result loads at most 10 MB, and the first figure at most 20 MB. All files are from
+    this server."""
     asked = []
     page.on("request", lambda request: asked.append(request))
     page.on("dialog", lambda dialog: dialog.accept())
@@ -306,7 +306,7 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
 
 
 def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
-    """Search for hidden tests, mark schemes and model answers, also reversed and as base64."""
+    """Search for hidden tests, mark schemes and model answers: plain, reversed or as base64."""
     kinds = "SOLUTION|HIDDEN TESTS|MARK SCHEME"
     secrets = {line for name in SETS for line in regions(name, kinds) if len(line) >= 30}
     code = [*ROOT.glob("rbcourse/**/*.py"), *ROOT.glob("classroom/rbclassroom/**/*.py")]

@@ -129,7 +129,7 @@ def folders(tmp_path, monkeypatch):
 
 
 def new_version(folders, source="2"):
-    """Change the lesson, and copy the lessons twice; the second time changes nothing."""
+    """Change the lesson, and copy the lessons twice; the second copy changes nothing."""
     notebook_at(folders[0] / "01_plane.ipynb", source)
     for _ in range(2):
         notebooks.copy_lessons(*folders)

@@ -91,7 +91,7 @@ def test_no_poll_answer_is_visible_before_a_slider_is_moved():
     assert off(tips("projection", "nearest"), np.eye(3)) < 1e-15
     assert arm.values["t"] == plan.values["t"] == 0
     links, way = (points(arm.artists[name]) for name in ("links", "way"))
-    # the links cover their pale copy
+    # the links lie on the pale links
     assert off(points(arm.artists["links"].axes.lines[0]), links) < 1e-15
     assert np.ptp(way, axis=0).max() < 1e-15
     plan.put(t=4.0)
@@ -191,7 +191,7 @@ def test_the_screw_and_the_geodesic_agree_with_the_package():
 
 @cache
 def spun(axis, tilt):
-    """Integrate the motion of a book with vertical momentum, without rbcourse."""
+    """Integrate, without rbcourse, the motion of a book whose momentum is vertical."""
     w0 = np.full(3, 4 * np.sin(np.radians(tilt)) / np.sqrt(2))
     w0[int(axis[-1]) - 1] = 4 * np.cos(np.radians(tilt))
     momentum = MOMENTS * w0 / np.linalg.norm(MOMENTS * w0)

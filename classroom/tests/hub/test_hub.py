@@ -71,7 +71,7 @@ def hub(tmp_path_factory):
     for name, value in {**replaced, "DEFAULT": url}.items():
         text = re.sub(rf"\b{name}\b", str(value), text)
     (folder / "jupyterhub_config.py").write_text(text)
-    # Copy the lessons like the hook in values.yaml.
+    # Copy the lessons as the hook in values.yaml does.
     (command,) = [VALUES["singleuser"]["lifecycleHooks"]["postStart"]["exec"]["command"]]
     paths = os.pathsep.join(map(str, (site, ROOT, ROOT / "classroom")))
     env = {**os.environ, "PYTHONPATH": paths}

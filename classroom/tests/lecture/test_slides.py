@@ -29,7 +29,7 @@ def text(source, slide=None, **more):
 
 
 def picture(name, slide=None, size=(400, 300), **more):
-    """Return a code cell with a black picture; its white margins are a tenth of the size."""
+    """Return a code cell with a black picture; its white margins are a tenth of its size."""
     still = Image.new("L", size, 255)
     still.paste(0, (size[0] // 10, size[1] // 10, size[0] * 9 // 10, size[1] * 9 // 10))
     file = io.BytesIO()

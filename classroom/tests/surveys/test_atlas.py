@@ -36,7 +36,7 @@ def test_each_cell_has_problems_of_its_family():
 def test_random_problems_are_uniform_in_balls():
     ends = atlas.random_problems(4000, 1.5, rng=3)
     for x, radius in ((turns(ends), 1.5), (ends.w0, 3), (ends.w1, 3)):
-        share = (norms(x) / radius) ** 3  # this share of the ball is nearer to its centre than x
+        share = (norms(x) / radius) ** 3  # the share of the ball closer to the centre than x
         assert share.max() < 1 + 1e-9
         assert np.abs(np.quantile(share, [0.25, 0.5, 0.75]) - [0.25, 0.5, 0.75]).max() < 0.05
         assert np.abs(x.mean(axis=0)).max() < 0.15 * radius

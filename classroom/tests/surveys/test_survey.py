@@ -14,7 +14,7 @@ from rbclassroom.surveys import atlas, body_atlas, progress, survey
 from rbclassroom.surveys.survey import costs, several_starts
 
 SOME = atlas.random_problems(60, 3, rng=2)
-# A turn from rest by a little less than 180°. The margin of the projection is 2 cos(89.9°).
+# A turn of almost 180° from rest to rest. The margin of the projection is 2 cos(89.9°).
 SHARP = atlas.Ends(np.eye(3)[None], rb.exp_so3([[0, 0, np.radians(179.8)]]), *np.zeros((2, 1, 3)))
 FEW = atlas.Ends(*map(np.concatenate, zip(SOME.take(slice(20)), SHARP, strict=True)))
 BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
@@ -166,7 +166,7 @@ if __name__ == "__main__":
 
 
 def test_processes_end_when_their_parent_is_killed(tmp_path):
-    """The worker processes hold the pipe of the parent's output open until they end."""
+    """The pipe of the parent's output stays open until the worker processes end."""
     script = tmp_path / "parent.py"
     script.write_text(KILLED)
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}

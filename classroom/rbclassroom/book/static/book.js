@@ -38,7 +38,7 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
 
-  // Shrink formulas that are too wide, at most to 80 %. Formulas that are still too wide can be scrolled, also with keys.
+  // Shrink formulas that are too wide, but not below 80 %. Formulas that are still too wide can be scrolled, also with keys.
   const fit = () => {
     for (const formula of all('mjx-container[display="true"]')) {
       formula.style.fontSize = "";
@@ -109,7 +109,7 @@ addEventListener("DOMContentLoaded", () => {
   });
   if (hero) ready.observe(hero, { childList: true, subtree: true });
 
-  // Show an excerpt below each search result, from the words of all pages.
+  // Show an excerpt of the page below each search result.
   const results = document.querySelector("#search-results");
   if (!results) return;
   const words = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase().split(/\s+/).filter(Boolean);

@@ -24,8 +24,8 @@ const fit = (figure) => {
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene that turns needs its margins
 };
 
-// A slide without pictures has larger text if the text fits. Other text shrinks if it is too long, down to 80 %.
-// A formula that is wider than its column shrinks, down to 62 %.
+// A slide without pictures has larger text if the text fits. Other text shrinks if it is too long, but not below 80 %.
+// A formula that is wider than its column shrinks, but not below 62 %.
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
   const formulas = all("mjx-container[display=true]", section);
