@@ -386,7 +386,7 @@ class AlongGeodesic(Curve):
 
 
 def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
-    """Write sin a and 1 − cos a, computed fast from tan(a/2), where a = 2 `half` `progress`."""
+    """Write sin a and 1 − cos a, computed from tan(a/2), where a is 2 · `half` · `progress`."""
     tangent = np.tan(np.multiply(progress, half, out=versine), out=versine)
     np.multiply(tangent, tangent, out=sine)
     sine += 1

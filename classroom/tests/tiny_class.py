@@ -1,4 +1,4 @@
-"""A course folder with the tiny set, and functions to hand in as a student."""
+"""A course folder with the tiny problem set, and functions that hand in answers."""
 
 import csv
 import html
@@ -58,7 +58,7 @@ def begun():
 
 
 class Class:
-    """A course folder with the tiny set, and functions to hand in as a student."""
+    """A course folder with the tiny problem set, and functions that hand in answers."""
 
     def __init__(self, folder, template):
         made, self.given = template
