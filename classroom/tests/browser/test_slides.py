@@ -36,16 +36,22 @@ def of(path):
     return (SLIDES / f"{path.stem}.html").as_uri()
 
 
+@pytest.mark.parametrize(
+    ("size", "theme"),
+    [
+        pytest.param((1920, 1080), "", id="light"),
+        pytest.param((1280, 720), "?dark", id="dark", marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
-def test_every_slide_fits_and_is_legible_from_the_last_row(context, path):
-    for size, theme in (((1920, 1080), ""), ((1280, 720), "?dark")):
-        with watched(context) as page:
-            page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
-            opened(page, of(path) + theme)
-            pictures = page.evaluate(PICTURES)
-            faults, thin = page.evaluate(FAULTS)
-            assert faults == []
-            assert len(thin) <= 3, thin
+def test_every_slide_fits_and_is_legible_from_the_last_row(context, path, size, theme):
+    with watched(context) as page:
+        page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+        opened(page, of(path) + theme)
+        pictures = page.evaluate(PICTURES)
+        faults, thin = page.evaluate(FAULTS)
+    assert faults == []
+    assert len(thin) <= 3, thin
     cells = nbformat.read(path, as_version=4).cells
     small = {  # 13.5 points suffice at 100 pixels per inch, and 14.5 points at 80
         output.data["text/plain"].partition(": ")[2]

@@ -24,7 +24,7 @@ const fit = (figure) => {
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene that turns needs its margins
 };
 
-// A slide without pictures has larger text if the text fits. Other text shrinks if it is too long, but not below 80 %.
+// A poll, or a slide without pictures, has larger text if the text fits. Other text shrinks if it is too long, but not below 80 %.
 // A formula that is wider than its column shrinks, but not below 62 %.
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
@@ -36,8 +36,9 @@ const settle = (section) => {
   });
   const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
-  const over = () => words.offsetHeight > room + 4;
-  let size = section.matches(".plain:not(.tabled)") ? 59 : 45;
+  const wide = () => all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
+  const over = () => words.offsetHeight > room + 4 || wide();
+  let size = section.matches(".plain, .poll") ? 59 : section.matches(".verdict") ? 52 : 45;
   for (set(size); over() && size > 36; set(size)) size -= size > 45 ? 7 : 1;
 };
 
