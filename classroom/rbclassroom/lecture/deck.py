@@ -64,17 +64,18 @@ def _words(slide: Slide) -> str:
 
 
 def _options(slide: Slide) -> str:
+    """Return the options of a poll, and the ideas behind them; a poll keeps the ideas hidden."""
     rows = []
     for letter, text in slide.options.items():
-        right, idea, state = letter == slide.right, "", ""
-        if slide.kind == "verdict":
-            state = " right" if right else " wrong"
-            said = _shortened(slide.ideas.get(letter, ""))
-            idea = f'<p class="idea{"" if right else " fragment"}">{_inline(said)}</p>'
-        body = f"<b>{letter}</b><div>{_inline(text)}{idea if slide.ideas else ''}</div>"
-        rows.append(f'<li class="option{state}">{body}</li>')
-    short = slide.kind == "poll" and all(len(text) < 14 for text in slide.options.values())
-    return f'<ul class="options{" short" * short}">{"".join(rows)}</ul>'
+        right = letter == slide.right and slide.kind == "verdict"
+        state = " right" if right else " wrong" if slide.kind == "verdict" else ""
+        step = "" if right or slide.kind == "poll" else " fragment"
+        idea = _inline(_shortened(slide.ideas.get(letter, "")))
+        said = f'<p class="idea{step}">{idea}</p>'
+        rows.append(
+            f'<li class="option{state}"><b>{letter}</b><div>{_inline(text)}</div>{said}</li>'
+        )
+    return f'<ul class="options">{"".join(rows)}</ul>'
 
 
 def _shortened(text: str) -> str:
@@ -97,6 +98,7 @@ def section(slide: Slide) -> str:
     elif slide.picture:
         narrow = " narrow" * (slide.words < 18)
         layout = "wide" if slide.picture.aspect > WIDE else f"split{narrow}"
+        layout = "plain sketched" if slide.picture.html.startswith("<svg") else layout
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
     if heading := re.match(r"\s*<h3>.*?</h3>", words):

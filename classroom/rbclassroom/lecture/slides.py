@@ -18,6 +18,7 @@ from rbclassroom.course.notebooks import living, split_sheet
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections whose slides come after the last slide; the key E leads to them."""
+SKETCHES = Path(__file__).with_name("sketches")
 ROWS = 4
 """The largest number of table rows, or of works, on one slide."""
 TOGETHER = 85
@@ -29,7 +30,7 @@ _LIVING = re.compile(r"rbcourseDisplay\.revive\(image, (\{.*\})\);\s*\}</script>
 
 @dataclass
 class Picture:
-    """A picture of a code cell: its HTML, and the ratio of its width to its height."""
+    """A picture of a code cell, or a sketch: its HTML, and the ratio of its width to its height."""
 
     html: str
     aspect: float
@@ -121,9 +122,14 @@ class _Reader:
                 self.put(Slide(self.title, "plain", parts, borrowed[0] if borrowed else None))
 
     def borrowed(self, name: str) -> Picture:
-        """Return the picture of a cell of this lesson, or of another lesson by ``lesson/cell``."""
+        """Return a picture: of a cell, of ``lesson/cell``, or the sketch ``sketches/name``."""
         lesson, _, cell = name.rpartition("/")
         cells = self.notebook.cells
+        if lesson == "sketches":
+            file = SKETCHES / f"{cell}.svg"
+            if not file.exists():
+                raise ValueError(f"slide: there is no sketch {file.name}")
+            return Picture(file.read_text(encoding="utf-8"), 0.9)
         if lesson:
             path = self.root / "notebooks" / f"{lesson}.ipynb"
             cells = nbformat.read(path, as_version=4).cells

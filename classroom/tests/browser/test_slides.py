@@ -174,6 +174,8 @@ def test_the_poll_and_its_verdict_show_the_votes_of_phones(context, home):
         page.keyboard.press("t")
         panel = page.locator("#vote")
         expect(panel.locator("svg")).to_be_visible()
+        for idea in page.locator("section.present > section.present .idea").all():
+            expect(idea).to_be_hidden()
         url = "http://" + panel.locator("div").first.inner_text()
         options = page.locator("section.present > section.present .option > div").all_inner_texts()
         for letters in ("B", "AC", "C"):

@@ -31,15 +31,19 @@ const settle = (section) => {
   const formulas = all("mjx-container[display=true]", section);
   const shrink = () => formulas.forEach((box) => {
     box.style.fontSize = "";
-    const [width, room] = [box.querySelector("svg"), box.parentElement].map((part) => part.getBoundingClientRect().width);
+    const parent = box.parentElement, { paddingLeft, paddingRight } = getComputedStyle(parent);
+    const width = box.querySelector("svg").getBoundingClientRect().width;
+    const room = parent.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
     if (width > room) box.style.fontSize = `${Math.max(62, Math.floor((98 * room) / width))}%`;
   });
   const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
   const wide = () => all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
   const over = () => words.offsetHeight > room + 4 || wide();
-  let size = section.matches(".plain, .poll") ? 59 : section.matches(".verdict") ? 52 : 45;
-  for (set(size); over() && size > 36; set(size)) size -= size > 45 ? 7 : 1;
+  let size = section.matches(".plain, .poll, .verdict") ? 59 : 45;
+  for (set(size); over() && size > 36; set(size)) size -= size > 45 ? 2 : 1;
+  const gap = parseFloat(getComputedStyle(words).rowGap), free = (room - words.offsetHeight) / (2 * words.children.length);
+  if (section.matches(".plain")) words.style.gap = `${gap + Math.max(0, Math.min(36, free))}px`;
 };
 
 // Pictures of the current and of the next slide become interactive; on paper, pictures are stills.
@@ -72,7 +76,7 @@ const keys = {
     const section = Reveal.getCurrentSlide(), poll = section.dataset.poll;
     const options = all(".option > div", section).map((option) => {
       const copy = option.cloneNode(true);
-      all(".idea, mjx-assistive-mml", copy).forEach((part) => part.remove());
+      all("mjx-assistive-mml", copy).forEach((part) => part.remove());
       return copy.innerHTML;
     });
     if (voting && (poll || state.open)) ask(state.open ? {} : { poll, options });
@@ -99,6 +103,12 @@ const ask = async (body) => {
   }
 };
 
+// The slides after the end are not counted.
+const numbered = (slide) => {
+  const count = 1 + sections.findIndex((section) => section.matches(".end")), at = 1 + sections.indexOf(slide ?? Reveal.getCurrentSlide());
+  return [at <= count ? `${at} / ${count}` : `end + ${at - count}`];
+};
+
 const show = ({ currentSlide }) => {
   if (printing) return;
   if (currentSlide.matches(".verdict")) { // show readouts from now on
@@ -123,7 +133,7 @@ const begin = async () => {
   document.body.classList.remove("settling");
   await Reveal.initialize({
     width: 1920, height: 1080, margin: 0, minScale: 0.1, maxScale: 4, center: false, display: "flex",
-    progress: true, controls: false, hash: true, slideNumber: "c/t", navigationMode: "linear",
+    progress: true, controls: false, hash: true, slideNumber: numbered, navigationMode: "linear",
     transition: "none", backgroundTransition: "none", pdfSeparateFragments: false, pdfMaxPagesPerSlide: 1,
     totalTime: 50 * 60, plugins: [RevealNotes],
     keyboardCondition: (event) => !event?.target?.closest?.("figure"), // a slider uses keys itself
