@@ -1,7 +1,6 @@
 """Lesson 6: families of projected lines, the chord, paths and the moving frame."""
 
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -20,26 +19,26 @@ from rbcourse.draw.spheres import draw_sphere
 
 _MARKED: dict[str, Any] = {"marker": "o", "markevery": 10}
 _MOTIONS: dict[str, dict[str, Any]] = {
-    "geodesic": {"color": COLOURS["optimum"], "ls": "-", "ms": 9, "mfc": "none", **_MARKED},
-    "projected line": {"color": COLOURS["projection"], "ls": "--", "ms": 5, **_MARKED},
+    "geodesic": {"color": COLOURS["optimum"], "ls": "-", "ms": 11, "mfc": "none", **_MARKED},
+    "projected line": {"color": COLOURS["projection"], "ls": "--", "ms": 7, **_MARKED},
 }
 _COLOURS = ListedColormap(plt.get_cmap("viridis_r")(np.linspace(0.4, 1, 256)))
 """The colours of viridis without the bright end, which is hard to see on white."""
-_DASHES: list[Any] = ["-", "--", "-.", ":", (0, (6, 1, 1, 1)), (0, (3, 1, 1, 1, 1, 1))]
-_LABELS = {"t": "time t", "angle": "angle a (rad)", "theta": "θ"}
+_SHOWN: dict[float, Any] = {30: "-", 90: "--", 150: "-.", 165: ":"}
+"""The angles in degrees whose curves `draw_family` draws, with their line styles."""
+_LABELS = {"t": "time t", "angle": "angle a", "theta": "θ"}
 _LABELS |= {"theta_dot": "dθ/dt", "f_dot": "df/dt"}
 
 
 def draw_family(ax: Axes, data: Table) -> None:
-    """Draw up to six curves from a table of angles, abscissas and values (BK Fig. 2, BK Fig. 3)."""
+    """Draw four curves from a table of angles, abscissas and values (BK Fig. 2, BK Fig. 3)."""
     (p_label, p), (x_label, x), (y_label, y) = _columns(data)
-    sixths = np.arange(1, 6) * np.pi / 6
-    rows = {*np.abs(p[:, :1] - sixths).argmin(axis=0).tolist(), len(p) - 1}
-    for row, dash in zip(sorted(rows), _DASHES, strict=False):
-        look = {"color": _COLOURS(p[row, 0] / np.pi), "ls": dash, "label": _pi_fraction(p[row, 0])}
+    for angle, dash in _SHOWN.items():
+        row = np.abs(p[:, 0] - np.radians(angle)).argmin()
+        look = {"color": _COLOURS(angle / 180), "ls": dash, "lw": 2.2, "label": f"{angle}°"}
         ax.plot(x[row], y[row], **look)
     ax.set(xlabel=x_label, ylabel=y_label, xlim=(x.min(), x.max()))
-    ax.legend(title=p_label, loc="center left", bbox_to_anchor=(1, 0.5))
+    ax.legend(title=p_label, loc="center left", bbox_to_anchor=(1, 0.5), reverse=True)
 
 
 def draw_surface(ax: Any, data: Table) -> None:
@@ -51,7 +50,7 @@ def draw_surface(ax: Any, data: Table) -> None:
     ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     ax.set_xlabel(x_label, labelpad=10)
     ax.set_ylabel(p_label, labelpad=13)
-    ax.set_yticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
+    ax.set_yticks([0, np.pi / 2, np.pi], ["0°", "90°", "180°"])
     ax.zaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     (left, _), (_, far), (_, top) = ax.get_xlim(), ax.get_ylim(), ax.get_zlim()
     ax.text(left, far, 1.1 * top, y_label, ha="center")  # above the vertical axis
@@ -64,15 +63,15 @@ def describe_family(data: Table) -> str:
     (_, p), (_, x), (y_label, y) = _columns(data)
     at = np.linspace(0, x.shape[1] - 1, 5).round().astype(int)
     ends = [
-        f"for the {which} angle, {_pi_fraction(p[row, 0])} rad, it is "
+        f"for the {which} angle, {np.degrees(p[row, 0]):.4g}°, it is "
         + ", ".join(f"{value:.3g}" for value in y[row, at])
         for which, row in (("smallest", 0), ("largest", -1))
     ]
     times = ", ".join(f"{value:g}" for value in x[0, at])
     return (
-        f"{y_label} over the time t for angles a from {_pi_fraction(p[0, 0])} to "
-        f"{_pi_fraction(p[-1, 0])}: a surface (left) and some of its sections (right). There are "
-        f"{len(p)} angles, with a colour for each. At the times {times} {'; '.join(ends)}."
+        f"{y_label} over the time t for {len(p)} angles a from {np.degrees(p[0, 0]):.4g}° to "
+        f"{np.degrees(p[-1, 0]):.4g}°, with a colour for each: a surface (left) and some of its "
+        f"sections (right). At the times {times} {'; '.join(ends)}."
     )
 
 
@@ -119,9 +118,10 @@ def draw_paths(ax: Any, paths: Mapping[str, Array]) -> None:
         ax.plot(*path.T, label=name, **_MOTIONS[name])
     way = paths["geodesic"]
     start, middle, end = way[[0, len(way) // 2, -1]]
+    up = np.cross(start, end) / np.linalg.norm(np.cross(start, end))
     for when, place in (("t = 0", start), ("t = 1", end)):
-        ax.text(*(0.82 * place), when, ha="center", va="center")
-    x, y, z = np.cross(start, end) / np.linalg.norm(np.cross(start, end)) + middle / 2
+        ax.text(*(0.72 * place + 0.12 * up), when, ha="center", va="center")
+    x, y, z = up + middle / 2
     ax.view_init(elev=np.degrees(np.arctan2(z, np.hypot(x, y))), azim=np.degrees(np.arctan2(y, x)))
 
 
@@ -156,12 +156,6 @@ def _columns(data: Table) -> list[tuple[str, Array]]:
     """Return the label and the values of each column."""
     plain = {name.split(" [")[0]: np.asarray(column, float) for name, column in data.items()}
     return [(_LABELS.get(name, name), column) for name, column in plain.items()]
-
-
-def _pi_fraction(angle: float) -> str:
-    share = Fraction(angle / np.pi).limit_denominator(24)
-    over = f"/{share.denominator}" if share.denominator > 1 else ""
-    return f"{'' if share.numerator == 1 else share.numerator}π{over}"
 
 
 def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> None:
