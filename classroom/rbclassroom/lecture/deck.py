@@ -16,7 +16,8 @@ from rbcourse.draw.display import ENGINE
 
 STATIC = Path(__file__).with_name("static")
 WIDE = 1.9
-"""A picture whose ratio of width to height exceeds this value is shown below its text."""
+"""A picture whose ratio of width to height exceeds this value is shown below its text. The value is
+1.6 if the text is brief."""
 IDEA = 26
 """The largest number of words in an idea behind an option, unless its first sentence has more."""
 # keys of cited works; only the book shows them
@@ -96,8 +97,9 @@ def section(slide: Slide) -> str:
     elif slide.poll:
         head, words = f"<h2>{slide.poll}</h2>", words + _options(slide)
     elif slide.picture:
+        brief = slide.words <= 30 and "math block" not in words
         narrow = " narrow" * (slide.words < 18)
-        layout = "wide" if slide.picture.aspect > WIDE else f"split{narrow}"
+        layout = "wide" if slide.picture.aspect > (1.6 if brief else WIDE) else f"split{narrow}"
         layout = "plain sketched" if slide.picture.html.startswith("<svg") else layout
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
