@@ -25,6 +25,7 @@ _KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")
 _LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # links to files of the course
 _TOGETHER = {  # patterns of text that must stay on one line
     r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
+    r"\b(kg|N) (?=m)": "\\1\N{NO-BREAK SPACE}",
     r" –": "\N{NO-BREAK SPACE}–",
     r"(\d)–(\d)": "\\1\N{WORD JOINER}–\N{WORD JOINER}\\2",
     r" ([^\s<]{1,5}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
