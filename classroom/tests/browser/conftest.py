@@ -60,15 +60,20 @@ def home(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
-def lab(home):
+def lab(home, tmp_path_factory):
     """Return a function ``lab(path)`` that gives the JupyterLab address of a path, with the
-    token."""
+    token. JupyterLab renders all cells, also those outside of its window."""
     course, env = home
+    settings = tmp_path_factory.mktemp("settings")
+    own = settings / "@jupyterlab" / "notebook-extension" / "tracker.jupyterlab-settings"
+    own.parent.mkdir(parents=True)
+    own.write_text('{"windowingMode": "none"}')
     words = ["jupyterlab", "--no-browser", "--ServerApp.port=0", "--expose-app-in-browser"]
     words.append(f"--ServerApp.root_dir={course / 'work'}")
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         words.append("--allow-root")
     configured = env | {"JUPYTER_CONFIG_PATH": str(Path(sys.prefix, "share", "rbcourse"))}
+    configured["JUPYTERLAB_SETTINGS_DIR"] = str(settings)
     address = r"(http://127\.0\.0\.1:\d+)/lab\?(token=\w+)"
     with serving(words, course, configured, address) as server:
         yield lambda path: f"{server[1]}/lab/{path}?{server[2]}"
