@@ -26,6 +26,7 @@ _LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # links to fi
 _TOGETHER = {  # patterns of text that must stay on one line
     r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
     r"\b(kg|N) (?=m)": "\\1\N{NO-BREAK SPACE}",
+    r"\b([Ff]igure|[Ll]esson|[Ss]ection) (?=\d)": "\\1\N{NO-BREAK SPACE}",
     r" –": "\N{NO-BREAK SPACE}–",
     r"(\d)–(\d)": "\\1\N{WORD JOINER}–\N{WORD JOINER}\\2",
     r" ([^\s<]{1,5}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
