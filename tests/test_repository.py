@@ -417,9 +417,8 @@ def distributions_for(requirements):
     return [importlib.metadata.distribution(name) for name in asked]
 
 
-NEEDS_PAGES = ["course.lab", "lecture", "book"]
+NEEDS_PAGES = ["course.lab", "lecture", "book", "live.engine"]
 NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "grade", "handout")]
-NEEDS_GRADING.append("live.engine")
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # each case lists the installed requirements, and the modules that need more

@@ -58,7 +58,7 @@ LIBRARIES = {
     | {"segno", "tornado"},
     "rbclassroom.assignments": {"IPython", "bleach", "jinja2", "matplotlib", "nbclient"}
     | {"nbconvert", "nbformat", "nbgrader", "traitlets"},
-    "rbclassroom.live": {"nbformat"},
+    "rbclassroom.live": {"nbformat", "pooch"},
     "rbclassroom.book": {"PIL", "jinja2", "nbformat", "pygments", "sphinx"},
 }
 

@@ -88,10 +88,6 @@ class Sources:
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(self.root / name, target)
 
-    def put_data(self, name: str, data: dict[str, Any]) -> None:
-        """Write the data of a page in which Python runs."""
-        _write(self.extra / LIVE / "pages" / f"{name}.json", json.dumps(data, ensure_ascii=False))
-
     def rendered(self, template: str, **further: Any) -> str:
         """Return a template in ``pages/``, filled with the data of the book."""
         return TEMPLATES.get_template(template).render(
@@ -109,7 +105,6 @@ class Sources:
             page, notebook = f"lessons/{path.name}", nbformat.read(path, as_version=4)
             _write(self.extra / page, nbformat.writes(lessons.without_outputs(notebook)) + "\n")
             title = notebook.cells[0].source.splitlines()[0].removeprefix("# ")
-            cells = pages.cells_of(notebook)
             figures += lessons.figures_of(path.name, notebook)
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
@@ -120,7 +115,6 @@ class Sources:
             lessons.add_buttons(notebook, path.name, self.repository)
             if self.live:
                 pages.mark_lesson(notebook, path.stem)
-                self.put_data(path.stem, {"cells": cells})
             self.put(page, nbformat.writes(notebook))
             if sheet:
                 self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
@@ -171,7 +165,8 @@ class Sources:
             notebook.cells[0].source = f"{title}\n{told}{rest}"
             if self.live:
                 pages.mark_problems(notebook)
-                self.put_data(name, {"notebook": given, "files": files})
+                data = json.dumps({"notebook": given, "files": files}, ensure_ascii=False)
+                _write(self.extra / LIVE / "pages" / f"{name}.json", data)
             self.put(f"problems/{name}.ipynb", nbformat.writes(notebook))
         self.shown["sets"] = names
 
@@ -328,7 +323,7 @@ def main() -> None:
     book = Path("book")
     try:
         build(Path(), book, asked.repository, engine.fetch() if asked.live else None)
-    except (OSError, ValueError, engine.EngineError) as error:
+    except (OSError, ValueError) as error:
         sys.exit(str(error))
     except subprocess.CalledProcessError:
         sys.exit("Sphinx could not make the pages; its messages are above.")

@@ -208,6 +208,8 @@ def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
     first = next((i for i, cell in enumerate(cells) if cell.source.startswith("## ")), len(cells))
     imports = [cell for cell in cells[:first] if cell.cell_type == "code"]
     others = [cell for cell in cells if not any(cell is each for each in imports)]
+    for cell in imports:
+        cell.metadata.tags = [*cell.metadata.get("tags", []), "imports"]
     text = new_markdown_cell("The code of this lesson begins with these imports.")
     return [*others, text, *imports] if imports else others
 

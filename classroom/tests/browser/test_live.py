@@ -14,6 +14,7 @@ from textwrap import indent
 from threading import Thread
 
 import nbformat
+import pooch
 import pytest
 from pages import watched
 from playwright.sync_api import expect
@@ -24,8 +25,9 @@ from rbclassroom.assignments.check import check
 from rbclassroom.assignments.collect import collect
 from rbclassroom.assignments.grade import grade
 from rbclassroom.assignments.handout import release
+from rbclassroom.book.lessons import joined
 from rbclassroom.live import engine
-from rbclassroom.live.pages import cells_of, left_out
+from rbclassroom.live.pages import LEFT_OUT
 
 ROOT = Path(__file__).parents[3]
 BOOK = ROOT / "book"
@@ -100,19 +102,21 @@ def told(outputs):
 )
 def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
     """Cells on the list of exceptions must give a different text. Slow cells are not run."""
-    notebook, listed = nbformat.read(path, as_version=4), left_out().get(path.stem, {})
-    stored, cells = {cell.id: cell for cell in notebook.cells}, cells_of(notebook)
+    listed, notebook = LEFT_OUT.get(path.stem, {}), nbformat.read(path, as_version=4)
+    cells = [cell for cell in joined(notebook.cells) if cell.cell_type == "code"]
     differ = set()
     for at, cell in enumerate(cells):
-        if listed.get(cell["id"], "").startswith("takes"):
-            differ.add(cell["id"])
+        if "_explorer(" in cell.source:
             continue
-        found = run([each["source"] for each in cells[:at]], cell["source"])
+        if listed.get(cell.id, "").startswith("takes"):
+            differ.add(cell.id)
+            continue
+        found = run([each.source for each in cells[:at]], cell.source)
         text = shown("".join(content for kind, content in found if kind not in ("html",)))
         pictures = [html.unescape(content) for kind, content in found if kind == "html"]
-        if (text, pictures) != told(stored[cell["id"]].outputs):
-            differ.add(cell["id"])
-            print(cell["id"], repr(text[-300:]), pictures)
+        if (text, pictures) != told(cell.outputs):
+            differ.add(cell.id)
+            print(cell.id, repr(text[-300:]), pictures)
     assert differ == listed.keys()
 
 
@@ -223,8 +227,8 @@ def test_a_second_visit_uses_stored_files(context, address):
             for code in codes:
                 found = page.evaluate(RUN, [{"above": [], "source": code}, ""])
                 assert {kind for kind, _ in found} == {"text"}, (visit, found)
-            kept = """async () => (await indexedDB.databases()).map(({ name }) => name)"""
-            assert "rbcourse engine" in page.evaluate(kept)
+            stored = "async () => (await (await caches.open('rbcourse engine')).keys()).length"
+            assert page.evaluate(stored) == 1
 
 
 def test_pages_opened_as_files_explain_what_is_missing(page):
@@ -316,7 +320,7 @@ def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
     forms = {way for line in secrets for way in (line.encode(), line.encode()[::-1])}
     shifts = [(b"xyz"[:k] + line.encode(), k) for line in secrets for k in range(3)]
     forms |= {base64.b64encode(text)[4 if k else 0 : -8] for text, k in shifts}
-    others = {*engine.files(), *map("{}.packed".format, engine.PACKED)}
+    others = {*engine.FILES, *map("{}.packed".format, engine.PACKED)}
     for path in BOOK.rglob("*.*"):
         if path.is_file() and path.suffix not in (".png", ".gif") and path.name not in others:
             content = path.read_bytes()
@@ -327,6 +331,6 @@ def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
 
 
 def test_the_files_of_pyodide_are_the_official_ones():
-    for name, digest in engine.files().items():
+    for name, digest in engine.FILES.items():
         if name not in engine.PACKED:
-            assert engine._digest((LIVE / name).read_bytes()) == digest, name
+            assert pooch.file_hash(str(LIVE / name)) == digest, name

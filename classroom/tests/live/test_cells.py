@@ -22,17 +22,21 @@ def run(above, source, known=()):
 
 def kept(above, source):
     """Return the earlier statements that are kept, as text."""
-    parts = cells.needed([cells.parsed(each, "<cell>") for each in above], cells.parsed(source, ""))
-    return [ast.unparse(each) for some in parts for each in some]
+    statements = [each for text in above for each in cells.parsed(text, "<cell>")]
+    return [ast.unparse(each) for each in cells.needed(statements, cells.parsed(source, ""))]
 
 
-ABOVE = ["import math, json\nfrom os import path, sep", "a = 1\nb = a + 1\nprint(b)", "a = 5"]
+ABOVE = [
+    "import math\nfrom os import path, sep\nimport json",
+    "a = 1\nb = a + 1\nprint(b)",
+    "a = 5",
+]
 
 
 def test_only_statements_that_a_cell_needs_are_kept():
     assert kept(ABOVE, "b") == ["a = 1", "b = a + 1"]
     assert kept(ABOVE, "a + math.pi") == ["import math", "a = 5"]
-    assert kept(ABOVE, "a = sep\na") == ["from os import sep"]
+    assert kept(ABOVE, "a = sep\na") == ["from os import path, sep"]
     assert kept(ABOVE, "sum(a for a in [1])") == []
     assert len(kept(["q = 1", "for q in range(2):\n    z = q"], "z")) == 1
 
