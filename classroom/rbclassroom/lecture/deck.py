@@ -18,7 +18,7 @@ STATIC = Path(__file__).with_name("static")
 WIDE = 1.9
 """A picture whose ratio of width to height exceeds this value is shown below its text. The value is
 1.6 if the text is brief."""
-IDEA = 26
+IDEA = 14
 """The largest number of words in an idea behind an option, unless its first sentence has more."""
 # keys of cited works; only the book shows them
 _KEYS = re.compile(r" \[\w+\d{4}(?:[;,] \w+\d{4})*\]")

@@ -119,7 +119,8 @@ class _Reader:
             parts = re.split(r"^\. \. \.$", _PICTURE.sub("", text), flags=re.M)
             parts = [part.strip() for part in parts if part.strip()]
             if parts or borrowed:
-                self.put(Slide(self.title, "plain", parts, borrowed[0] if borrowed else None))
+                title = self.section or self.title
+                self.put(Slide(title, "plain", parts, borrowed[0] if borrowed else None))
 
     def borrowed(self, name: str) -> Picture:
         """Return a picture: of a cell, of ``lesson/cell``, or the sketch ``sketches/name``."""

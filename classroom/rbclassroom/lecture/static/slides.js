@@ -7,6 +7,12 @@ const sections = all(".slides section section");
 
 // Enlarge a picture with its controls as far as its place allows, and cut off white margins.
 const fit = (figure) => {
+  const sketch = figure.querySelector(":scope > svg");
+  if (sketch) { // without the empty parts above and below the drawing
+    const { y, height } = sketch.getBBox();
+    sketch.setAttribute("viewBox", `0 ${y - 10} 640 ${height + 20}`);
+    sketch.style.aspectRatio = `640 / ${height + 20}`;
+  }
   const seen = figure.querySelector(":scope > :is(canvas, img)"), panel = figure.querySelector(":scope > div");
   if (!seen || !figure.clientWidth) return;
   const crop = figure.dataset.crop ?? seen.dataset.crop ?? "";
@@ -40,8 +46,8 @@ const settle = (section) => {
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
   const wide = () => all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
   const over = () => words.offsetHeight > room + 4 || wide();
-  let size = section.matches(".plain, .poll, .verdict") ? 59 : 45;
-  for (set(size); over() && size > 36; set(size)) size -= size > 45 ? 2 : 1;
+  const sizes = section.matches(".plain, .poll, .verdict") ? [58, 52, 46, 42, 39, 36] : [45, 42, 39, 36];
+  do set(sizes.shift()); while (over() && sizes.length);
   const gap = parseFloat(getComputedStyle(words).rowGap), free = (room - words.offsetHeight) / (2 * words.children.length);
   if (section.matches(".plain")) words.style.gap = `${gap + Math.max(0, Math.min(36, free))}px`;
 };
@@ -106,6 +112,7 @@ const ask = async (body) => {
 // The slides after the end are not counted.
 const numbered = (slide) => {
   const count = 1 + sections.findIndex((section) => section.matches(".end")), at = 1 + sections.indexOf(slide ?? Reveal.getCurrentSlide());
+  if (!slide || slide === Reveal.getCurrentSlide()) document.querySelector("#bar").style.width = `${(100 * Math.min(at, count)) / count}%`;
   return [at <= count ? `${at} / ${count}` : `end + ${at - count}`];
 };
 
@@ -133,7 +140,7 @@ const begin = async () => {
   document.body.classList.remove("settling");
   await Reveal.initialize({
     width: 1920, height: 1080, margin: 0, minScale: 0.1, maxScale: 4, center: false, display: "flex",
-    progress: true, controls: false, hash: true, slideNumber: numbered, navigationMode: "linear",
+    progress: false, controls: false, hash: true, slideNumber: numbered, navigationMode: "linear",
     transition: "none", backgroundTransition: "none", pdfSeparateFragments: false, pdfMaxPagesPerSlide: 1,
     totalTime: 50 * 60, plugins: [RevealNotes],
     keyboardCondition: (event) => !event?.target?.closest?.("figure"), // a slider uses keys itself
