@@ -48,6 +48,9 @@ const settle = (section) => {
   const over = () => words.offsetHeight > room + 4 || wide();
   const sizes = section.matches(".plain, .poll, .verdict") ? [58, 52, 46, 42, 39, 36] : [45, 42, 39, 36];
   do set(sizes.shift()); while (over() && sizes.length);
+  for (const [, option, idea] of all(".poll .option", section.parentElement).map((row) => row.children)) {
+    option.style.top = `${idea.offsetHeight / 2 + 2}px`; // in the middle of its box, as the idea is hidden
+  }
   const gap = parseFloat(getComputedStyle(words).rowGap), free = (room - words.offsetHeight) / (2 * words.children.length);
   if (section.matches(".plain")) words.style.gap = `${gap + Math.max(0, Math.min(36, free))}px`;
 };
