@@ -7,13 +7,13 @@ With s = vee skew Q and the matrix B = ½ (tr Q I − Qᵀ), for which vee skew(
     h² w'(0) = 6 s − 4 h w₀ − 2 h B w₁,    h² w'(1) = −6 s + 2 h Bᵀ w₀ + 4 h w₁.
 
 The condition that w' is the same on both sides of each inner pose is a linear system for the
-velocities. Each leg contributes a symmetric element (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]], and the load 6
-s/h² at both of its ends. No singular value of B is larger than 1. So the system is diagonally
-dominant and positive definite, and it has exactly one solution, for any poses. For unit quaternions
+velocities. Each leg contributes a symmetric element (1/h) [[4 I, 2 B], [2 Bᵀ, 4 I]], and the load
+6 s/h² at both of its ends. No singular value of B is larger than 1. So the system is diagonally
+dominant and positive definite, and has exactly one solution, for any poses. For unit quaternions
 q = (cos ½θ, x) of Q, the element is the same with B = cos ½θ I + x̂, and the loads are 12 x/h². For
 a body with the weight W, let K = Rᵀ M'' W. Then vee(K − Kᵀ) = τ = G w' + w × G w. For a continuous
-torque, three things change: G replaces I; B is defined by B w = vee(Q ŵ W − (Q ŵ W)ᵀ); and the
-loads are computed from Q W and −Qᵀ W. For the velocity of the origin in the body frame, B = Q.
+torque, G replaces I, B w = vee(Q ŵ W − (Q ŵ W)ᵀ), and Q W and −Qᵀ W give the loads. For the
+velocity of the origin in the body frame, B = Q.
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
 continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
@@ -44,15 +44,11 @@ _EQUAL = 1e-12
 
 
 def spline_velocities(
-    times: ArrayLike,
-    poses: ArrayLike,
-    ends: PathEnds = "natural",
-    inertia: ArrayLike | None = None,
+    times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natural", inertia: ArrayLike | None = None
 ) -> Array:
     """Return the velocities for which cubic legs join with a continuous acceleration.
 
-    The velocities solve one linear system, which is positive definite for all poses. The computing
-    time is proportional to N.
+    They solve one linear system, in a time proportional to N. It is definite for all poses.
     Source: beyond BK 13.
 
     Parameters
@@ -78,8 +74,8 @@ def spline_velocities(
     -----
     If the poses are moved, the velocities move with them; if the times are reversed, the velocities
     are those of the reversed path. For rotations about one axis by small angles, the velocities are
-    those of SciPy's ``CubicSpline``. Singular set: successive poses that are a half-turn apart (up
-    to 1e-6) raise ValueError, since no leg joins them.
+    those of SciPy's ``CubicSpline``. Singular set: successive poses a half-turn apart (up to 1e-6)
+    raise ValueError.
 
     Examples
     --------
@@ -91,17 +87,26 @@ def spline_velocities(
     """
     times, poses, _ = checked_path(times, poses)
     G = None if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
-    fixed, given = as_ends(ends, len(poses), 3 if poses.shape[-1] == 3 else 6)
-    parts = [rotation_system(times, poses[:, :3, :3], G)]
-    if poses.shape[-1] == 4:
-        parts.append(path_system(times, poses))
-    columns = np.split(given, len(parts), axis=1)
-    found = [x.solve(fixed, y, is_periodic(ends)) for x, y in zip(parts, columns, strict=True)]
-    return np.concatenate(found, axis=1)
+    systems = _systems(np.diff(times), poses, G)
+    conditions = as_ends(ends, len(poses), 3 * len(systems))
+    columns = np.split(conditions.given, len(systems), axis=1)
+    each = zip(systems, columns, strict=True)
+    return np.concatenate([x.solve(conditions._replace(given=y)) for x, y in each], axis=1)
+
+
+class Conditions(NamedTuple):
+    """End conditions: `given` values, shape (N, m), at the knots that are `fixed`; 0 elsewhere.
+
+    If `periodic`, no value is given, and the values at the first and the last knot are equal.
+    """
+
+    fixed: NDArray[np.bool_]
+    given: Array
+    periodic: bool = False
 
 
 class KnotSystem(NamedTuple):
-    """A quadratic function ½ xᵀ H x − xᵀ b of unknowns x at N knots: a sum over the legs.
+    """A quadratic function ½ xᵀ H x − xᵀ b of values x at N knots, m at each: a sum over the legs.
 
     Each leg adds its element [[A, B], [Bᵀ, D]] to H and (b0, b1) to b at its two knots. The blocks
     have the shape (N − 1, m, m), and the loads the shape (N − 1, m).
@@ -113,136 +118,122 @@ class KnotSystem(NamedTuple):
     b0: Array
     b1: Array
 
-    def solve(self, fixed: NDArray[np.bool_], given: Array, periodic: bool = False) -> Array:
-        """Return the minimizer x, shape (N, m), where x = `given` at the knots that are `fixed`.
+    def solve(self, ends: Conditions) -> Array:
+        """Return the minimizer x that meets the end conditions, shape (N, m).
 
-        If `periodic`, x is the same at the first and the last knot. LinAlgError is raised if H is
-        not positive definite.
+        LinAlgError is raised if H is not positive definite.
         """
+        fixed, given, periodic = ends
+        if not periodic:
+            return self._solve(fixed, given[..., None])[..., 0]
+        # x is composed of the minimizers whose values at both ends are 0, or unit vectors
+        count, m = given.shape
+        values, both = np.zeros((count, m, 1 + m)), np.zeros(count, bool)
+        values[[0, -1], :, 1:], both[[0, -1]] = np.eye(m), True
+        x = self._solve(both, values)
+        first = self.b0[0, :, None] - self.A[0] @ x[0] - self.B[0] @ x[1]
+        last = self.b1[-1, :, None] - self.B[-1].T @ x[-2] - self.D[-1] @ x[-1]
+        load, by_units = np.split(first + last, [1], axis=1)
+        np.linalg.cholesky(load - by_units)  # raises LinAlgError if not positive definite
+        end = np.linalg.solve(load - by_units, load[:, 0])
+        return x[..., 0] + (x[..., 1:] - x[..., :1]) @ end
+
+    def _solve(self, fixed: NDArray[np.bool_], given: Array) -> Array:
+        """Return a minimizer for each column of `given`, shape (N, m, columns)."""
         from scipy.linalg import solveh_banded
 
-        on, right = np.zeros((len(fixed), *self.A.shape[1:])), np.zeros_like(given)
-        on[:-1] += self.A
-        on[1:] += self.D
-        right[:-1] += self.b0 - matvec(self.B, given[1:])
-        right[1:] += self.b1 - matvec(self.B.mT, given[:-1])
-        right -= matvec(on, given)
-        on[fixed], right[fixed] = np.eye(on.shape[-1]), 0
+        count, m, columns = given.shape
+        starts = self.b0[..., None] - self.A @ given[:-1] - self.B @ given[1:]
+        ends = self.b1[..., None] - self.B.mT @ given[:-1] - self.D @ given[1:]
+        on, load = at_knots(self.A, self.D), at_knots(starts, ends)
+        on[fixed], load[fixed] = np.eye(m), 0
         above = np.where((fixed[1:] | fixed[:-1])[:, None, None], 0, self.B)
-        if not periodic:
-            band = _band(on, above)
-            return given + solveh_banded(band, right.ravel(), lower=True).reshape(given.shape)
-        first, load = on[0] + on[-1], right[0] + right[-1]
-        inner = np.zeros((len(on) - 2, *on.shape[1:]))  # columns that belong to the first knot
-        if len(inner):
-            inner[0] += above[0].mT
-            inner[-1] += above[-1]
-            columns = np.concatenate([inner, right[1:-1, :, None]], axis=-1)
-            flat = columns.reshape(-1, columns.shape[-1])
-            x = solveh_banded(_band(on[1:-1], above[1:-1]), flat, lower=True)
-            by_first, alone = x[:, :-1], x[:, -1]
-            first = first - inner.reshape(by_first.shape).T @ by_first
-            load = load - inner.reshape(by_first.shape).T @ alone
-        else:
-            first = first + above[0] + above[0].mT
-            by_first, alone = np.zeros((0, len(load))), np.zeros(0)
-        np.linalg.cholesky((first + first.mT) / 2)  # raises LinAlgError if not positive definite
-        end = np.linalg.solve(first, load)
-        between = (alone - by_first @ end).reshape(-1, len(end))
-        return np.concatenate([end[None], between, end[None]])
-
-
-def _band(on: Array, above: Array) -> Array:
-    """Return a symmetric block-tridiagonal matrix as a band of its lower half."""
-    count, m = on.shape[:2]
-    band = np.zeros((2 * m, m * count))
-    for p in range(m):
+        band = np.zeros((2 * m, m * count))
         for q in range(m):
-            if q <= p:
-                band[p - q, q::m] = on[:, p, q]
-            band[m + p - q, q : m * (count - 1) : m] = above[:, q, p]
-    return band
+            band[: m - q, q::m] = on[:, q:, q].T
+            band[m - q : 2 * m - q, q : m * (count - 1) : m] = above[:, q].T
+        x = solveh_banded(band, load.reshape(-1, columns), lower=True)
+        return given + x.reshape(given.shape)
 
 
-def rotation_system(times: Array, R: Array, G: Array | None = None) -> KnotSystem:
-    """Return the system of the angular velocities, in the metric G."""
-    k, Q = 1 / np.diff(times)[:, None, None], R[:-1].mT @ R[1:]
+def at_knots(starts: Array, ends: Array) -> Array:
+    """Return the sum of the legs' values at each knot, shape (N, ...), from shapes (N − 1, ...)."""
+    none = np.zeros((1, *starts.shape[1:]))
+    return np.concatenate([starts, none]) + np.concatenate([none, ends])
+
+
+def _cubic_system(h: Array, G: Array, B: Array, *loads: Array) -> KnotSystem:
+    """Return the system with elements [[4 G, 2 B], [2 Bᵀ, 4 G]]/h, and with loads times 6/h²."""
+    k = 1 / h[:, None, None]
+    same = 4 * k * G
+    return KnotSystem(same, 2 * k * B, same, *(6 * k[:, 0] ** 2 * x for x in loads))
+
+
+def _systems(h: Array, poses: Array, G: Array | None = None) -> list[KnotSystem]:
+    """Return the systems of w, in the metric G, and for poses also of the velocity v = Rᵀ d'."""
+    R, d = poses[:, :3, :3], poses[:, :3, 3:]
+    Q = R[:-1].mT @ R[1:]
     if G is None:
-        same, load = 4 * k * np.eye(3), 3 * k[:, 0] ** 2 * _skew(Q)
-        twice_B = np.trace(Q, axis1=1, axis2=2)[:, None, None] * np.eye(3) - Q.mT
-        return KnotSystem(same, k * twice_B, same, load, load)
-    W = weight_of("inertia", G)
-    B = np.stack([_skew(Q @ unit @ W) for unit in hat(np.eye(3))], axis=-1)
-    loads = (6 * k[:, 0] ** 2 * _skew(x) for x in (Q @ W, -Q.mT @ W))
-    return KnotSystem(4 * k * G, 2 * k * B, 4 * k * G, *loads)
+        load = _skew(Q) / 2
+        B = (np.trace(Q, axis1=1, axis2=2)[:, None, None] * np.eye(3) - Q.mT) / 2
+        turning = _cubic_system(h, np.eye(3), B, load, load)
+    else:
+        W = weight_of("inertia", G)
+        B = _skew(Q[:, None] @ (hat(np.eye(3)) @ W)).mT
+        turning = _cubic_system(h, G, B, _skew(Q @ W), -_skew(Q.mT @ W))
+    return [turning, path_system(h, R, d[..., 0])] if d.size else [turning]
 
 
-def quaternion_system(times: Array, R: Array, long: NDArray[np.bool_]) -> KnotSystem:
-    """Return the system for unit quaternions; legs for which `long` is True turn the long way."""
-    k, q = 1 / np.diff(times)[:, None, None], quaternion_from_matrix(R[:-1].mT @ R[1:])
-    q = np.where(long[:, None], -q, q)
-    same, load = 4 * k * np.eye(3), 12 * k[:, 0] ** 2 * q[:, 1:]
-    return KnotSystem(same, 2 * k * (q[:, :1, None] * np.eye(3) + hat(q[:, 1:])), same, load, load)
-
-
-def path_system(times: Array, poses: Array) -> KnotSystem:
+def path_system(h: Array, R: Array, d: Array) -> KnotSystem:
     """Return the system of the velocities v = Rᵀ d' of the origin."""
-    k, (R, d) = 1 / np.diff(times)[:, None, None], (poses[:, :3, :3], poses[:, :3, 3])
-    same, chords = 4 * k * np.eye(3), 6 * k[:, 0] ** 2 * np.diff(d, axis=0)
+    chords = np.diff(d, axis=0)
     loads = matvec(R[:-1].mT, chords), matvec(R[1:].mT, chords)
-    return KnotSystem(same, 2 * k * (R[:-1].mT @ R[1:]), same, *loads)
+    return _cubic_system(h, np.eye(3), R[:-1].mT @ R[1:], *loads)
+
+
+def quaternion_system(h: Array, R: Array, long: NDArray[np.bool_] | bool = False) -> KnotSystem:
+    """Return the system for unit quaternions; legs for which `long` is True turn the long way."""
+    q = np.where(long, -1, 1)[..., None] * quaternion_from_matrix(R[:-1].mT @ R[1:])
+    B = q[:, :1, None] * np.eye(3) + hat(q[:, 1:])
+    return _cubic_system(h, np.eye(3), B, 2 * q[:, 1:], 2 * q[:, 1:])
 
 
 def _skew(X: Array) -> Array:
     return vee(X - X.mT)
 
 
-def as_ends(ends: PathEnds, count: int, size: int) -> tuple[NDArray[np.bool_], Array]:
-    """Return a mask of the poses whose velocities are given, and the velocities (0 elsewhere)."""
+def as_ends(ends: PathEnds | Conditions, count: int, size: int) -> Conditions:
+    """Return the end conditions for `count` knots, with `size` values at each."""
+    if isinstance(ends, Conditions):
+        return ends
     fixed, given = np.zeros(count, bool), np.zeros((count, size))
     if isinstance(ends, str):
         if ends not in ("natural", "periodic"):
             raise ValueError(f"ends: 'natural', 'periodic' or a pair is wanted, got {ends!r}")
-        return fixed, given
+        return Conditions(fixed, given, ends == "periodic")
     if len(ends) != 2:
         raise ValueError(f"ends: a pair of velocities is wanted, got {len(ends)} of them")
     for place, value in ((0, ends[0]), (-1, ends[1])):
         if value is not None:
             fixed[place], given[place] = True, as_single("ends", value, size)
-    return fixed, given
+    return Conditions(fixed, given)
 
 
-def is_periodic(ends: PathEnds) -> bool:
-    """Return whether the end conditions are periodic."""
-    return isinstance(ends, str) and ends == "periodic"
-
-
-def resting_spline(times: Array, poses: Array) -> tuple[Array, Array, Array, Array]:
-    """Return w, d', w' and d'' at the poses; for rotations, d' and d'' have no components.
+def resting_spline(times: Array, poses: Array) -> tuple[Array, Array]:
+    """Return (w, Rᵀ d') and (w', Rᵀ d'') at the poses; for rotations, only w and w'.
 
     All of them are 0 at both ends and where two successive poses are equal up to rounding.
     """
     change, far = np.abs(np.diff(poses, axis=0)), np.abs(poses[:, :3, 3:]).max(initial=0)
     same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
     same &= np.all(change[:, :3, 3:] <= 64 * EPS * far, axis=(1, 2))
-    rests, R = np.append(True, same) | np.append(same, True), poses[:, :3, :3]
-    system, given = rotation_system(times, R), np.zeros((len(poses), 3))
-    w = system.solve(rests, given)
-    a = _accelerations(system, w)
-    a[rests] = 0
-    if poses.shape[-1] == 3:
-        return w, np.zeros((len(R), 0)), a, np.zeros((len(R), 0))
-    system = path_system(times, poses)
-    v = system.solve(rests, given)
-    bend = _accelerations(system, v)
-    bend[rests] = 0
-    return w, matvec(R, v), a, matvec(R, bend)
-
-
-def _accelerations(system: KnotSystem, x: Array) -> Array:
-    """Return the accelerations at the starts of the legs, and 0 at the end of the last leg."""
-    starts = system.b0 - matvec(system.A, x[:-1]) - matvec(system.B, x[1:])
-    return np.append(starts, np.zeros((1, 3)), axis=0)
+    rests, found = np.append(True, same) | np.append(same, True), []
+    for system in _systems(np.diff(times), poses):
+        x = system.solve(Conditions(rests, np.zeros((len(poses), 3))))
+        starts = system.b0 - matvec(system.A, x[:-1]) - matvec(system.B, x[1:])
+        found.append([x, np.where(rests[:, None], 0, np.append(starts, 0 * x[:1], axis=0))])
+    velocities, accelerations = np.concatenate(found, axis=-1)
+    return velocities, accelerations
 
 
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:

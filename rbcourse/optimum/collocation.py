@@ -22,6 +22,7 @@ EXACT = 3e-12  # bound on the residual and on the last Chebyshev coefficients of
 SHARE = 0.03  # SHARE * EXACT bounds the relative residual of p and the last coefficients of k
 LONGEST_STEP = 0.5  # rad: no step turns a node by more than this
 ROUGH = 1e-2  # rad: after a step shorter than this, the method continues on more nodes
+NODES = 17, 25, 33, 49, 65, 97, 129
 FAILED, FINER, SOLVED = range(3)
 Arrays: TypeAlias = tuple[Array, ...]
 
@@ -48,10 +49,10 @@ class Failure(NamedTuple):
     residual: float
     iterations: int
 
-
-def cost_of(one: Solution | Failure) -> float:
-    """Return the cost, which is infinite for a failure."""
-    return one.cost if isinstance(one, Solution) else np.inf
+    @property
+    def cost(self) -> float:
+        """The cost, which is infinite."""
+        return np.inf
 
 
 class Equations(Protocol):
@@ -133,7 +134,7 @@ def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
         if not len(number):
             break
         if n > first:
-            unknowns = _on_nodes(equations, n, unknowns)
+            unknowns = refined(equations, n, unknowns)
         now = _newton(equations, unknowns, rough=n == first)
         steps += now.steps
         solved, finer = now.verdict == SOLVED, now.verdict == FINER
@@ -154,12 +155,16 @@ def _with_ends(equations: Equations, R: Array) -> Array:
     return R
 
 
-def _on_nodes(equations: Equations, n: int, unknowns: Arrays) -> Arrays:
+def refined(equations: Equations, n: int, unknowns: Arrays) -> Arrays:
     """Return the unknowns interpolated to n nodes; c does not depend on the nodes."""
     R, *others = unknowns
     up = interpolation(R.shape[1], n)
-    R = _with_ends(equations, orthogonal(along(up, R)))
-    return R, *(up @ x if x.ndim == 3 else x for x in others)
+    return _with_ends(equations, on_nodes(R, n)), *(up @ x if x.ndim == 3 else x for x in others)
+
+
+def on_nodes(R: Array, n: int) -> Array:
+    """Return rotations at nodes, shape (N, ..., 3, 3), interpolated to n nodes."""
+    return orthogonal(along(interpolation(R.shape[1], n), R))
 
 
 class Iterate(NamedTuple):
@@ -288,8 +293,8 @@ class Stationary:
         return by.fit @ (w - by.from_ends[0] @ self.ends), np.zeros((len(R), 3))
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n and those of 25, 33, 49, 65, 97, 129 that are larger."""
-        return n, *(more for more in (25, 33, 49, 65, 97, 129) if more > n)
+        """Return n and those of `NODES` that are larger."""
+        return n, *(more for more in NODES if more > n)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
         """Return the largest error of each problem, and the data for a step.
@@ -322,7 +327,7 @@ class Stationary:
         by, P = primitives(n, self.ends.shape[1]), self.functional.p_by(*rates)
         known, lacking = mending_turns(R, E, W)[..., None], lacking[..., None]
         if by_ends:
-            effects = sum(_by_ends(F, x) for F, x in zip(by.from_ends, P, strict=True))
+            effects = sum(by_ends_of(F, x) for F, x in zip(by.from_ends, P, strict=True))
             known = np.concatenate([known, _turns_by_ends(R, by.from_ends[0])], axis=-1)
             lacking = np.concatenate([lacking, effects], axis=-1)
         turned_by_k = _integrals(R, by.from_k[0])
@@ -364,7 +369,7 @@ class Stationary:
         return k, c, costs(self.functional, self.ends, k)
 
 
-def _by_ends(from_ends: Array, matrices: Array) -> Array:
+def by_ends_of(from_ends: Array, matrices: Array) -> Array:
     """Multiply the matrices by the rates for unit end values; the shape is (N, n, 3, 3 m)."""
     products = matrices[..., None, :] * from_ends[:, None, :, None]
     return products.reshape(*products.shape[:3], -1)
@@ -372,7 +377,7 @@ def _by_ends(from_ends: Array, matrices: Array) -> Array:
 
 def _turns_by_ends(R: Array, from_ends: Array) -> Array:
     """Return ∫ R δw dt at the nodes for a unit change of each end value."""
-    return along(grid(R.shape[1]).integral, _by_ends(from_ends, R))
+    return along(grid(R.shape[1]).integral, by_ends_of(from_ends, R))
 
 
 def _integrals(R: Array, K: Array) -> Array:

@@ -210,15 +210,24 @@ def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]
 
 def _best_change(functional: Functional, R: Array) -> Array:
     """Return the η of a Gauss–Newton step at the nodes."""
-    order, bumps = functional.ends // 2 + 1, R.shape[1] // 2
-    nodes, bump = grid(R.shape[1]), _bumps(R.shape[1], order)
-    rates = rates_of(R, order)
-    root, u = np.sqrt(nodes.integral[-1])[:, None], functional.deviation(*rates)
+    bumps = _bumps(R.shape[1], functional.ends // 2 + 1)
+    J, u = gauss_newton(functional, R, bumps)
+    x = np.linalg.solve(J.mT @ J, -(J.mT @ u))
+    return bumps[0] @ x.reshape(len(R), -1, 3)
+
+
+def gauss_newton(functional: Functional, R: Array, shapes: list[Array]) -> tuple[Array, Array]:
+    """Return the derivatives J of the deviation u with respect to the coefficients of η, and u.
+
+    η is a sum of `shapes`, given with their derivatives at the nodes. The sum of the squared
+    entries of u, shape (N, 3 n, 1), approximates the integral of ‖u‖².
+    """
+    count, n = R.shape[:2]
+    rates, root = rates_of(R, len(shapes) - 1), np.sqrt(grid(n).integral[-1])[:, None]
     D = np.stack(by_eta(functional.deviation_by(*rates), rates), axis=-2)
-    J = np.stack(bump, axis=-1)[:, None] @ (root[..., None, None] * D)
-    J = J.reshape(len(R), 3 * len(root), 3 * bumps)
-    x = np.linalg.solve(J.mT @ J, -(J.mT @ (root * u).reshape(len(R), 3 * len(root), 1)))
-    return bump[0] @ x.reshape(len(R), bumps, 3)
+    J = np.stack(shapes, axis=-1)[:, None] @ (root[..., None, None] * D)
+    u = root * functional.deviation(*rates)
+    return J.reshape(count, 3 * n, -1), u.reshape(count, 3 * n, 1)
 
 
 def by_eta(by: list[Array], rates: list[Array]) -> list[Array]:
@@ -245,18 +254,19 @@ def cost_at_nodes(functional: Functional, R: Array) -> Array:
 
 def rates_of(R: Array, count: int) -> list[Array]:
     """Return `count` rates w, w', … at the nodes, from R at the nodes."""
-    derivative = grid(R.shape[1]).derivative
-    rates = [vee(R.mT @ along(derivative, R))]
-    for _ in range(count - 1):
-        rates.append(derivative @ rates[-1])
-    return rates
+    return with_derivatives(vee(R.mT @ along(grid(R.shape[1]).derivative, R)), count - 1)
+
+
+def with_derivatives(values: Array, count: int) -> list[Array]:
+    """Return values at the nodes, shape (..., n, columns), and their first derivatives."""
+    found = [values]
+    for _ in range(count):
+        found.append(grid(values.shape[-2]).derivative @ found[-1])
+    return found
 
 
 @lru_cache
 def _bumps(n: int, m: int) -> list[Array]:
     """Return tᵐ (1 − t)ᵐ times n//2 Chebyshev polynomials at the nodes, and m derivatives."""
-    nodes = grid(n)
-    shapes: list[Array] = [(nodes.t * (1 - nodes.t))[:, None] ** m * chebyshev(nodes.t, n // 2)]
-    for _ in range(m):
-        shapes.append(nodes.derivative @ shapes[-1])
-    return shapes
+    t = grid(n).t
+    return with_derivatives((t * (1 - t))[:, None] ** m * chebyshev(t, n // 2), m)

@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from rbcourse._numerics import EPS, Array
 from rbcourse.bezier import corrected_bezier_so3
 from rbcourse.curves import Ends
-from rbcourse.optimum.chebyshev import along, grid, interpolation
+from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.collocation import (
     BallStationary,
     Failure,
     Solution,
     Stationary,
     cayley,
-    cost_of,
-    orthogonal,
+    on_nodes,
     rates_at_nodes,
     relax,
     relax_ball,
@@ -147,7 +146,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
         problem, R = starts(ends.take(index), n)
         number, free = between_free_motions(ends.take(index), functional.G[index], n)
         more = [k for k, i in enumerate(index) if i in curves]
-        of_balls = [_on_nodes(curves[index[k]].R[None], n) for k in more]
+        of_balls = [on_nodes(curves[index[k]].R[None], n) for k in more]
         return np.concatenate([problem, number, np.array(more, int)]), np.concatenate(
             [R, free, *of_balls]
         )
@@ -180,11 +179,6 @@ def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
     ends = given.flat()
     R0, R1 = (nearest(R)[0] for R in ends[:2])  # Newton's method fails if R has few correct digits
     return ends._replace(R0=R0, R1=R1), np.stack([x.reshape(-1, 3) for x in rates], axis=1)
-
-
-def _on_nodes(R: Array, n: int) -> Array:
-    """Return rotations at nodes, shape (N, ..., 3, 3), interpolated to n nodes."""
-    return orthogonal(along(interpolation(R.shape[1], n), R))
 
 
 def cheapest(task: Task) -> list[Solution | Failure]:
@@ -243,7 +237,7 @@ def _with_more_turns(
     some = ~(cost > LIMITS.turned * least[problem]) & ~_repeated(problem, cost, R)
     problem, R = (
         problem[some],
-        with_ends(_on_nodes(R[some], LIMITS.nodes_for_turns), ends[problem[some]]),
+        with_ends(on_nodes(R[some], LIMITS.nodes_for_turns), ends[problem[some]]),
     )
     R, cost = lowered(effort.take(problem), R, *LIMITS.on_more_nodes)
     turned = 0
@@ -286,7 +280,7 @@ def _leave_the_axis(
             if size[0] > 0 and size[1] < LIMITS.flat * size[0]:
                 sides = LIMITS.bend * _across(w / size[0], effort.G[i])[:, None]
                 turn = (4 * t * (1 - t))[:, None] ** order * sides
-                bent.append(_on_nodes(one.R[None], task.nodes) @ cayley(turn))
+                bent.append(on_nodes(one.R[None], task.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
     number = np.array(problem, int)
     R, cost = lowered(task.functional.take(number), np.concatenate(bent), *LIMITS.bent)
@@ -317,7 +311,7 @@ def _follow_on(
 ) -> None:
     """Solve some problems from more starts, on n nodes, where the costs are more accurate."""
     mine = np.isin(problem, index)
-    problem, R = problem[mine], with_ends(_on_nodes(R[mine], n), task.equations.ends[problem[mine]])
+    problem, R = problem[mine], with_ends(on_nodes(R[mine], n), task.equations.ends[problem[mine]])
     more, as_they_are = _started(task, index, n)
     problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
     functional = task.functional.take(problem)
@@ -335,7 +329,7 @@ def _follow_on(
 
 
 def _costs(found: list[Solution | Failure]) -> Array:
-    return np.array([cost_of(one) for one in found])
+    return np.array([one.cost for one in found])
 
 
 def _least(count: int, problem: Numbers, cost: Array) -> Array:
@@ -366,5 +360,5 @@ def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failu
     If two solutions have the same cost, the first one is kept, so that rounding does not choose.
     """
     for i, one in zip(problem, task.solver(task.equations.take(problem), R), strict=True):
-        if found[i] is NOTHING or cost_of(one) < (1 - SAME) * cost_of(found[i]):
+        if found[i] is NOTHING or one.cost < (1 - SAME) * found[i].cost:
             found[i] = one
