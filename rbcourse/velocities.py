@@ -143,9 +143,10 @@ class KnotSystem(NamedTuple):
         from scipy.linalg import solveh_banded
 
         count, m, columns = given.shape
-        starts = self.b0[..., None] - self.A @ given[:-1] - self.B @ given[1:]
-        ends = self.b1[..., None] - self.B.mT @ given[:-1] - self.D @ given[1:]
-        on, load = at_knots(self.A, self.D), at_knots(starts, ends)
+        on, load = at_knots(self.A, self.D), at_knots(self.b0, self.b1)[..., None]
+        if given.any():
+            x, y = given[:-1], given[1:]
+            load = load - at_knots(self.A @ x + self.B @ y, self.B.mT @ x + self.D @ y)
         on[fixed], load[fixed] = np.eye(m), 0
         above = np.where((fixed[1:] | fixed[:-1])[:, None, None], 0, self.B)
         band = np.zeros((2 * m, m * count))

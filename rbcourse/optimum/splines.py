@@ -108,8 +108,9 @@ def minimum_acceleration_spline_so3(
     Notes
     -----
     If velocities are given at both ends, a curve of least acceleration exists. With natural or
-    periodic ends, such a curve may not exist: more full turns on the legs can make the cost as
-    small as you like. For bodies, a result that is not `certified` can have a leg that is a saddle.
+    periodic ends, it may not exist. For example, for rotations by 0, 1 and 0.3 rad about one axis,
+    at the times 0, 1 and 1 + √2, more full turns on the legs make the cost as small as you like.
+    For bodies, a result that is not `certified` can have a leg that is a saddle.
     A leg that is much shorter than its neighbours may spin; to prevent this, insert poses. Singular
     set: neighbouring rotations a half-turn apart raise ValueError.
 
