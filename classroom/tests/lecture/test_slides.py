@@ -272,9 +272,9 @@ def test_lessons_follow_the_rules_for_authors(path, decks):
 
 def plain(tex):
     """Return TeX without the commands that change only its look."""
-    return re.sub(
-        r"\\(?:begin|end)\{aligned\}|\\(?:bigl|bigr|Bigl|Bigr|left|right|qquad|quad|[,;:! ])|[\s&{}]", "", tex
-    ).rstrip(".,;")
+    looks = "begin{aligned}", "end{aligned}", "bigl", "bigr", "Bigl", "Bigr", "left", "right"
+    looks = "|".join(map(re.escape, (*looks, "qquad", "quad", *",;:! ")))
+    return re.sub(rf"\\(?:{looks})|[\s&{{}}]", "", tex).rstrip(".,;")
 
 
 def pieces(formula):
