@@ -82,8 +82,9 @@ def chain(
     joints (the velocity jumps). With the default legs and velocities, it is C², except at inner
     poses where it rests. It is also C² with `projected_quintic_so3`, `exponential_quintic_so3` and
     `minimum_jerk_so3`. All other legs take velocities, and the chain is C¹: the acceleration jumps,
-    unless the velocities belong to a spline of these legs (`quaternion_spline_so3`). At the joints of projected legs, velocities agree to a few eps of the largest ‖w‖, and
-    accelerations to a few eps of ‖w‖² + ‖w'‖.
+    unless the velocities belong to a spline of these legs (`quaternion_spline_so3`). At the joints
+    of projected legs, velocities agree to a few eps of the largest ‖w‖, and accelerations to a few
+    eps of ‖w‖² + ‖w'‖.
     The accelerations a0, a1 are 0 at both ends and where the curve rests. At other poses they are
     those of the default chain, even if velocities are given.
     A chain at rest at both ends costs more than one with natural ends (`projected_spline_se3`).
