@@ -45,8 +45,8 @@ const settle = (section) => {
   const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
   const wide = () => all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
-  const over = () => words.offsetHeight > room + 4 || wide();
-  const sizes = section.matches(".plain") ? [58, 52, 46, 42, 39, 36] : section.matches(".poll, .verdict") ? [48, 44, 40, 36] : [45, 42, 39, 36];
+  const over = () => words.offsetHeight > room || wide();
+  const sizes = section.matches(".plain") ? [56, 46, 42, 39, 36] : section.matches(".poll, .verdict") ? [48, 44, 40, 36] : [45, 42, 39, 36];
   do set(sizes.shift()); while (over() && sizes.length);
   for (const [, option, idea] of all(".poll .option", section.parentElement).map((row) => row.children)) {
     option.style.top = `${idea.offsetHeight / 2 + 2}px`; // in the middle of its box, as the idea is hidden
