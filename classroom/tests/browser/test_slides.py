@@ -112,6 +112,11 @@ def test_a_remote_control_goes_through_all_steps(deck):
         assert steps < 150
     lesson = deck_of(LESSONS[6])
     assert steps >= len(lesson.shown) + 20
+    number, bar = deck.locator(".slide-number"), deck.locator("#bar")
+    for text in f"{len(lesson.shown)} / {len(lesson.shown)}", "end + 1":
+        expect(number).to_have_text(text)
+        assert bar.evaluate("(bar) => bar.offsetWidth === innerWidth")
+        deck.keyboard.press("e")
     deck.keyboard.press("e")
     assert "Exercise 1" in deck.evaluate(HERE)
     deck.keyboard.press("e")

@@ -30,7 +30,7 @@ const fit = (figure) => {
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene that turns needs its margins
 };
 
-// A poll, or a slide without pictures, has larger text if the text fits. Other text shrinks if it is too long, but not below 80 %.
+// Text has the largest size that fits. The last size is 36 pixels.
 // A formula that is wider than its column shrinks, but not below 62 %.
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
@@ -48,7 +48,7 @@ const settle = (section) => {
   const over = () => words.offsetHeight > room || wide();
   const sizes = section.matches(".plain") ? [56, 46, 42, 39, 36] : section.matches(".poll, .verdict") ? [48, 44, 40, 36] : [45, 42, 39, 36];
   do set(sizes.shift()); while (over() && sizes.length);
-  for (const [, option, idea] of all(".poll .option", section.parentElement).map((row) => row.children)) {
+  for (const [, option, idea] of section.matches(".poll") ? all(".option", section).map((row) => row.children) : []) {
     option.style.top = `${idea.offsetHeight / 2 + 2}px`; // in the middle of its box, as the idea is hidden
   }
   const gap = parseFloat(getComputedStyle(words).rowGap), free = (room - words.offsetHeight) / (2 * words.children.length);
@@ -114,8 +114,8 @@ const ask = async (body) => {
 
 // The slides after the end are not counted.
 const numbered = (slide) => {
-  const count = 1 + sections.findIndex((section) => section.matches(".end")), at = 1 + sections.indexOf(slide ?? Reveal.getCurrentSlide());
-  if (!slide || slide === Reveal.getCurrentSlide()) document.querySelector("#bar").style.width = `${(100 * Math.min(at, count)) / count}%`;
+  const [count, at] = [document.querySelector(".end"), slide ?? Reveal.getCurrentSlide()].map((each) => 1 + sections.indexOf(each));
+  if (!printing) document.querySelector("#bar").style.width = `${(100 * Math.min(at, count)) / count}%`;
   return [at <= count ? `${at} / ${count}` : `end + ${at - count}`];
 };
 
