@@ -10,17 +10,14 @@ import sys
 import tempfile
 import threading
 import webbrowser
-from base64 import b64decode
 from pathlib import Path
 from typing import Any
 
 import segno
-from tornado.escape import json_decode, json_encode
-from tornado.httpclient import AsyncHTTPClient
+from tornado.escape import json_decode
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler, StaticFileHandler
-from tornado.websocket import websocket_connect
 
 from rbclassroom.course.notebooks import lesson_paths
 from rbclassroom.lecture.deck import put_mathjax, write
@@ -30,8 +27,6 @@ from rbclassroom.lecture.votes import Phones, find_address
 HOST = "127.0.0.1"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
 """Programs that print a page as PDF."""
-READY = "document.documentElement.dataset.ready"
-"""The JavaScript expression that tells whether the slides are laid out."""
 
 
 def find_lesson(number: str, folder: Path) -> Path:
@@ -56,6 +51,17 @@ class _Here(RequestHandler):
 
 class Slides(_Here, StaticFileHandler):
     """The handler of the files of the slides."""
+
+
+class Hold(RequestHandler):
+    """The handler of an image that a page requests, and drops when its slides are laid out.
+
+    A browser prints a page when all of its images are loaded or dropped.
+    """
+
+    async def get(self) -> None:
+        """Wait."""
+        await asyncio.Event().wait()
 
 
 class Desk(_Here):
@@ -99,7 +105,7 @@ async def serve(path: Path, phones: Phones | None, browser: bool, pdf: Path | No
         if phones:
             handlers.append(("/slides/votes", Desk, {"phones": phones, "token": token}))
             phones.start()
-        handlers.append((r"/(.*)", Slides, {"path": folder}))
+        handlers += [("/slides/hold", Hold, {}), (r"/(.*)", Slides, {"path": folder})]
         server = HTTPServer(Application(handlers, log_function=lambda handler: None))
         sockets = bind_sockets(0, HOST)
         server.add_sockets(sockets)
@@ -128,42 +134,25 @@ async def print_pdf(address: str, pdf: Path) -> None:
         wanted = f"no browser that prints was found; install one of {', '.join(BROWSERS)}"
         raise ValueError(f"{wanted}, or name a browser in the variable BROWSER")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        words = ["--headless", "--disable-gpu", "--no-first-run", "--remote-debugging-port=0"]
+        made = Path(profile, "slides.pdf")
+        words = ["--headless", "--disable-gpu", "--no-first-run", "--no-pdf-header-footer"]
         if hasattr(os, "geteuid") and os.geteuid() == 0:
             words.append("--no-sandbox")  # Chromium has no sandbox for the administrator
-        words += [f"--user-data-dir={profile}", f"{address}?print-pdf"]
+        words += [f"--user-data-dir={profile}", f"--print-to-pdf={made}"]
         quiet = asyncio.subprocess.DEVNULL
-        job = await asyncio.create_subprocess_exec(found, *words, stdout=quiet, stderr=quiet)
+        job = await asyncio.create_subprocess_exec(
+            found, *words, f"{address}?print-pdf&hold", stdout=quiet, stderr=quiet
+        )
         try:
-            async with asyncio.timeout(120):
-                pdf.write_bytes(await _printed(Path(profile, "DevToolsActivePort")))
-        except (TimeoutError, OSError, KeyError) as error:
+            await asyncio.wait_for(job.wait(), 120)
+            shutil.copyfile(made, pdf)
+        except (TimeoutError, OSError) as error:
             raise ValueError(f"{found} could not print the slides: {error!r}") from error
         finally:
-            job.kill()
-            await job.wait()
+            if job.returncode is None:
+                job.kill()
+                await job.wait()
     print(f"{pdf}: {pdf.stat().st_size / 1e6:.1f} MB")
-
-
-async def _printed(told: Path) -> bytes:
-    """Return the page of a browser as PDF; the browser writes its port to the file `told`."""
-    while not (told.exists() and told.read_text().count("\n")):
-        await asyncio.sleep(0.1)
-    port = told.read_text().split()[0]
-    pages = await AsyncHTTPClient().fetch(f"http://{HOST}:{port}/json/list")
-    page = next(each for each in json_decode(pages.body) if each["type"] == "page")
-    socket = await websocket_connect(page["webSocketDebuggerUrl"], max_message_size=200_000_000)
-
-    async def ask(method: str, **parameters: object) -> Any:
-        socket.write_message(json_encode({"id": 1, "method": method, "params": parameters}))
-        while (answer := json_decode(await socket.read_message() or "{}")).get("id") != 1:
-            pass
-        return answer["result"]
-
-    while not (await ask("Runtime.evaluate", expression=READY))["result"].get("value"):
-        await asyncio.sleep(0.1)
-    made = await ask("Page.printToPDF", preferCSSPageSize=True, printBackground=True)
-    return b64decode(made["data"])
 
 
 def open_votes(address: str) -> Phones | None:

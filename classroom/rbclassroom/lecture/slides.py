@@ -172,8 +172,6 @@ class _Reader:
 
     def read_code(self, cell: NotebookNode, wish: str) -> None:
         name = re.search(r'save_\w+\(\s*fig,\s*"(?:lesson\d\d_|paper_|report_)?(\w+)"', cell.source)
-        if r"\printed" in wish:
-            wish = wish.replace(r"\printed", printed(cell))
         key = name[1] if name else "explorer" if "_explorer()" in cell.source else cell.id
         figure = re.fullmatch(r"fig(\d+)([a-z]?)", key)
         self.keys |= {f"figure {figure[1]}", f"figure {figure[1]}{figure[2]}"} if figure else {key}
@@ -290,19 +288,6 @@ class _Reader:
             last.parts[0] += f"\n\n{text}"
         else:
             self.put(Slide(self.section, "plain", [text]))
-
-
-def printed(cell: NotebookNode) -> str:
-    """Return the first matrix that a code cell prints, as TeX."""
-    texts = [o.get("text") or o.get("data", {}).get("text/plain", "") for o in cell.outputs]
-    lines = re.findall(r"\[([^\[\]]+)\]", "".join(texts))
-    rows = [re.findall(r"-?\d+(?:\.\d*)?", line) for line in lines]
-    rows = [row for row in rows if row and len(row) == len(rows[0])]
-    if not rows:
-        raise ValueError(f"slide: {cell.id} prints no matrix")
-    places = max(len(number.partition(".")[2]) for row in rows for number in row)
-    inside = r" \\ ".join(" & ".join(f"{float(x):.{places}f}" for x in row) for row in rows)
-    return rf"\begin{{pmatrix}}{inside}\end{{pmatrix}}"
 
 
 def picture_of(cell: NotebookNode, root: Path) -> Picture | None:

@@ -2,6 +2,7 @@
 // Slides of a lesson: sizes, interactive pictures, keys, votes. All files that they need are in the folder.
 const all = (what, where = document) => [...where.querySelectorAll(what)];
 const printing = /[?&](print-pdf|view=print)/.test(location.search);
+const hold = /[?&]hold/.test(location.search) && Object.assign(new Image(), { src: "hold" }); // see serve.py
 const voting = /[?&]token=/.test(location.search) && window === window.top;
 const sections = all(".slides section section");
 
@@ -141,6 +142,10 @@ const begin = async () => {
   all("figure").forEach(fit);
   all("aside mjx-assistive-mml").forEach((part) => part.remove()); // the speaker view has no style for these
   document.body.classList.remove("settling");
+  if (hold) { // reveal.js lays out the paper after the load event, which waits for this image
+    Object.defineProperty(document, "readyState", { value: "complete" });
+    addEventListener("pdf-ready", () => { hold.src = "data:,"; });
+  }
   await Reveal.initialize({
     width: 1920, height: 1080, margin: 0, minScale: 0.1, maxScale: 4, center: false, display: "flex",
     progress: false, controls: false, hash: true, slideNumber: numbered, navigationMode: "linear",
