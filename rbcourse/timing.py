@@ -4,14 +4,15 @@ The timing s(t) moves the body along a path c(s). Let x = s'² and u = s'' = ½ 
 V = c(s, 1) = (ω, v) and A = c(s, 2) = (α, β), the motion has the velocity V s' and the acceleration
 V u + A x in the body frame. The torque is G ω u + (G α + ω × G ω) x. The acceleration of the point
 r of the body is (v + ω × r) u + (β + α × r + ω × (ω × r)) x. The force on a mass m at this point is
-m times this acceleration, minus m Rᵀ g. So a limit on a speed has the form x ≤ X(s), and every
-other limit has the form ‖a u + b x + k‖ ≤ 1.
+m times this acceleration, minus m Rᵀ g. So every limit has the form ‖a u + b x + k‖ ≤ 1. For a
+limit on a speed, a = k = 0, and b is the square of the share that the speed uses at s' = 1.
 
-The path is divided into cells of length h. In a cell, u is constant, x changes linearly from x_i to
-y = x_i+1, and u = (y − x_i)/2h. Each limit is imposed at both ends of the cell. Since a, b and k
-may jump between cells, their values inside the cell are used. The limit is ‖p x_i + q y + k‖ ≤ 1.
-At the start, p = b − a/2h and q = a/2h; at the end, p = −a/2h and q = b + a/2h. These limits are
-ellipses, or strips, in the plane of x_i and y.
+The path is divided into cells of length h. In a cell, u is constant, x is linear in s from x_i to
+y = x_i+1, and u = (y − x_i)/2h. The vector a u + b x + k is replaced by the quadratic polynomial
+with the same values at the start, in the middle and at the end of the cell. The polynomial lies in
+the convex hull of its Bernstein coefficients, so that the limit holds in the whole cell if it holds
+for them. They have the form p x_i + q y + k. So each limit is an ellipse, or a strip, in the plane
+of x_i and y. Since a, b and k may jump between cells, their values inside the cell are used.
 
 The algorithm makes two passes. The backward pass finds the largest x_i from which the end can be
 reached. The forward pass finds the largest x_i+1 that x_i and the first pass allow. Since the
@@ -33,13 +34,14 @@ other method that times poses under limits on the norms of vectors.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, sqrt
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_inertia, as_positive, as_single, as_time
 from rbcourse._numerics import Array, cross, matvec
@@ -47,16 +49,15 @@ from rbcourse.curves import Curve
 from rbcourse.paths import Chain
 
 FINER = 1, 2, 4, 8
-TOLERANCE = 1e-4  # the share by which a limit may be exceeded inside a cell
-_REPEATS = 12
-_INSIDE = np.linspace(0, 1, 6)[:, None, None]
-_BETWEEN = np.linalg.solve(
-    np.vander(np.linspace(0, 1, 6)).T, np.vander(np.linspace(0, 1, 121), 6).T
-).T
-"""The matrix that maps values at six points of a cell to their polynomial at 121 points."""
+TOLERANCE = 1e-4  # the share by which a limit may be exceeded
+_PLACES = np.array([0, 0.5, 1])[:, None, None]
+"""The places in a cell at which the path is evaluated."""
+_CONTROL = np.array([[1, 0, 0], [-0.5, 2, -0.5], [0, 0, 1]])
+"""Maps the values of a quadratic polynomial at these places to its Bernstein coefficients."""
 _SPEEDS = "angular_speed", "speed"
 _BENDS = "angular_acceleration", "acceleration", "torque", "force"
 Row = tuple[str, Array, Array, Array]
+Rows = Callable[[Array, Array, Array], Iterator[Row]]
 
 
 def fastest(
@@ -114,15 +115,15 @@ def fastest(
     Warns
     -----
     RuntimeWarning
-        If a limit is still exceeded by more than 1e-4 between the points of the finest grid.
+        If a limit is still exceeded by more than 1e-4 with the finest grid.
 
     Notes
     -----
     The grid has 1,000 cells or, for a chain, 250 for each leg (25 if there are many legs). It is
-    refined by factors of at most eight, until no limit is exceeded by more than 1e-4 between its
-    points. T is then about 1e-3 above the shortest time. The motion stops where the velocity of the
-    path jumps. The acceleration of the motion jumps where the acceleration of the path jumps, at
-    both ends, and between cells; the jerk is not limited. A thousand cells take about 50 ms.
+    refined by factors of at most eight, until no limit is exceeded by more than 1e-4. T is then
+    about 1e-3 above the shortest time. The motion stops where the velocity of the path jumps. Its
+    acceleration jumps where that of the path jumps, at both ends, and between cells; the jerk is
+    not limited. A thousand cells take about 50 ms.
 
     Examples
     --------
@@ -133,7 +134,7 @@ def fastest(
     (3.5, array([0., 0., 1.]))
     """
     path = curve.curve if isinstance(curve, Timed) else curve
-    limits = _limits(
+    rows_of = _limits(
         path,
         angular_speed=angular_speed,
         speed=speed,
@@ -146,19 +147,22 @@ def fastest(
         centre=centre,
         gravity=gravity,
     )
-    if not set(limits.most) & set(_BENDS):
-        raise ValueError(f"limits: one of {', '.join(_BENDS)} is needed")
     ends = as_single("rates", rates, 2)
     if ends.min() < 0:
         raise ValueError(f"rates: two numbers from 0 up are wanted, got {rates}")
     for finer in FINER:
-        grid = _sampled(path, finer)
-        x, used = _squared_rates(grid, limits, ends)
-        timed = Timed(duration=np.array(1.0), curve=path, s=grid.s, rate=np.sqrt(x))
+        s, V, A, R, caps, near = _sampled(path, finer)
+        rows, moving = list(rows_of(V, A, R)), np.array([V[0, 0].any(), V[-1, -1].any()])
+        if all(name in _SPEEDS for name, *_ in rows):
+            raise ValueError(f"limits: one of {', '.join(_BENDS)} is needed")
+        held = np.max([np.linalg.norm(k, axis=-1) for *_, k in rows], axis=(0, 1))
+        if (held >= 1).any():
+            where = f"to hold the body near s = {s[np.argmax(held >= 1)]:.6g}"
+            raise ValueError(f"force: {held.max():.6g} times the limit is needed {where}")
+        x = _two_passes(s, _ellipses(np.diff(s), rows, near), caps, ends**2 * moving, moving)
+        timed = Timed(duration=np.array(1.0), curve=path, s=s, rate=np.sqrt(x))
         timed = replace(timed, duration=np.array(timed.times[-1]))
-        most, when = max(_shares(timed, limits, 5001).values())
-        if used.max() > most:
-            most, when = float(used.max()), timed.times[np.argmax(used)]
+        most, when = max(_shares(timed, rows_of, 5001).values())
         if most <= 1 + TOLERANCE:
             return timed
     what = f"a limit is exceeded by {most - 1:.1e} near s = {timed.progress(when)[0]:.6g}"
@@ -194,14 +198,14 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
     return _shares(curve, _limits(curve, **limits), 20_001)
 
 
-def _shares(curve: Curve, limits: _Limits, count: int) -> dict[str, tuple[float, float]]:
+def _shares(curve: Curve, rows_of: Rows, count: int) -> dict[str, tuple[float, float]]:
     t = np.linspace(*curve.domain, count)
     if isinstance(curve, Chain | Timed):
-        t = np.unique([*t, *curve.times[:-1], *np.nextafter(curve.times[1:], -inf)])
-    V, A, R = (curve(t, order) for order in (1, 2, 0))
+        starts, ends = curve.times[:-1], np.nextafter(curve.times[1:], -inf)
+        t = np.unique([*t, *starts, *(starts + ends) / 2, *ends])
     shares: dict[str, Array] = {}
-    for name, a, b, k in limits.rows(V, A, R[:, :3, :3]):
-        share = np.linalg.norm(a if name in _SPEEDS else b + k, axis=-1)
+    for name, _, b, k in rows_of(curve(t, 1), curve(t, 2), curve(t)[:, :3, :3]):
+        share = np.linalg.norm(b + k, axis=-1) ** (0.5 if name in _SPEEDS else 1)
         shares[name] = np.maximum(shares.get(name, 0.0), share)
     first = {name: np.argmax(x >= x.max() * (1 - 1e-6)) for name, x in shares.items()}
     return {name: (float(x.max()), float(t[first[name]])) for name, x in shares.items()}
@@ -268,31 +272,6 @@ class Timed(Curve):
         return self
 
 
-class _Limits(NamedTuple):
-    most: dict[str, Array]
-    G: Array
-    mass: float
-    centre: Array
-    gravity: Array
-
-    def rows(self, V: Array, A: Array, R: Array) -> list[Row]:
-        """Return the name, a, b and k of each limit; a limit on a speed is ‖a‖² x ≤ 1."""
-        (w, bend), (_, G, m, r, g) = (V[..., :3], A[..., :3]), self
-        parts = {"angular_speed": (w,), "angular_acceleration": (w, bend)}
-        parts["torque"] = w @ G, bend @ G + cross(w, w @ G)
-        if V.shape[-1] == 6:
-            v, pull = V[..., 3:] + cross(w, r), A[..., 3:] + cross(bend, r) + cross(w, cross(w, r))
-            parts |= {"speed": (v,), "acceleration": (v, pull)}
-            parts["force"] = m * v, m * pull, -m * matvec(R.mT, g)
-        rows = []
-        for name, most in self.most.items():
-            a, b, k = (*parts[name], *np.zeros((2, *w.shape)))[:3]
-            for i in [[0, 1, 2]] if most.ndim == 0 else [[0], [1], [2]]:
-                each = np.broadcast_to(most, 3)[i]
-                rows.append((name, a[..., i] / each, b[..., i] / each, k[..., i] / each))
-        return rows
-
-
 def _limits(
     curve: Curve,
     *,
@@ -301,7 +280,8 @@ def _limits(
     centre: ArrayLike = (0.0, 0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     **limits: ArrayLike | None,
-) -> _Limits:
+) -> Rows:
+    """Check the limits, and return a function that yields the name, a, b and k of each limit."""
     if not isinstance(curve, Curve) or curve.batch_shape:
         raise ValueError(f"curve: a single Curve, not a stack, is wanted, got {curve!r}")
     most = {name: as_finite(name, x) for name, x in limits.items() if x is not None}
@@ -317,116 +297,80 @@ def _limits(
     if "torque" in most and inertia is None:
         raise ValueError("inertia: it is required for a limit on the torque")
     G = np.eye(3) if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
-    vectors = as_single("centre", centre, 3), as_single("gravity", gravity, 3)
-    return _Limits(most, G, as_positive("mass", mass), *vectors)
+    m, r = as_positive("mass", mass), as_single("centre", centre, 3)
+    g = as_single("gravity", gravity, 3)
+
+    def rows(V: Array, A: Array, R: Array) -> Iterator[Row]:
+        w, bend, none = V[..., :3], A[..., :3], np.zeros_like(V[..., :3])
+        parts = {"angular_speed": (none, w, none), "angular_acceleration": (w, bend, none)}
+        parts["torque"] = w @ G, bend @ G + cross(w, w @ G), none
+        if curve.size == 4:
+            v, pull = V[..., 3:] + cross(w, r), A[..., 3:] + cross(bend, r) + cross(w, cross(w, r))
+            parts |= {"speed": (none, v, none), "acceleration": (v, pull, none)}
+            parts["force"] = m * v, m * pull, -m * matvec(R.mT, g)
+        for name, x in most.items():
+            for i in [[0, 1, 2]] if x.ndim == 0 else [[0], [1], [2]]:
+                a, b, k = (part[..., i] / np.broadcast_to(x, 3)[i] for part in parts[name])
+                if name in _SPEEDS:
+                    a, b, k = a[..., :1], np.vecdot(b, b)[..., None], k[..., :1]
+                yield name, a, b, k
+
+    return rows
 
 
-class _Grid(NamedTuple):
-    """The grid points, shape (N + 1,), and V, A, R at six points of each cell, shape (6, N, ...).
+def _sampled(path: Curve, finer: int) -> tuple[Array, ...]:
+    """Return the grid points s, shape (N + 1,), and V, A, R at three places of each of the N cells.
 
-    `stops` contains the indices of the grid points at which x = 0.
+    Each leg has the same number of cells, which are smaller near ends with c' = c'' = 0. The array
+    `caps` has the largest allowed x: 0 at these ends and at corners, and infinity elsewhere. The
+    cells `near` rest are the first or last 4 % of a leg.
     """
-
-    s: Array
-    V: Array
-    A: Array
-    R: Array
-    stops: NDArray[np.intp]
-
-
-def _sampled(curve: Curve, finer: int) -> _Grid:
-    """Return a grid with the same number of cells on each leg.
-
-    The cells are smaller near ends with c' = c'' = 0.
-    """
-    legs = (curve.legs if isinstance(curve, Chain) else curve).flat
-    knots = curve.times if isinstance(curve, Chain) else np.append(0.0, legs.duration)
-    L, h, halves = legs.count, legs.duration, (curve.size - 2, 3)
+    knots = path.times if isinstance(path, Chain) else np.array(path.domain)
+    h, L, halves = np.diff(knots), len(knots) - 1, path.size - 2
     n = finer * max(1000 // L, min(250, 4000 // L), 25)
-    q, probe = np.linspace(0, 1, n + 1)[:, None], np.linspace(0, 1, 5)[:, None]
-    far = np.array([1.0, np.abs(legs.values(probe, 0)[..., :3, 3:]).max(initial=0)])[: halves[0]]
+
+    def at(share: Array) -> Array:
+        return np.minimum(knots[:-1] + share * h, np.nextafter(knots[1:], -inf))
 
     def sizes(x: Array) -> Array:
-        return np.abs(x.reshape(*x.shape[:-1], *halves)).max(axis=-1)
+        return np.abs(x.reshape(*x.shape[:-1], halves, 3)).max(axis=-1)
 
-    rates, bends = (sizes(legs.values(probe, order)) for order in (1, 2))
-    rest = (rates <= 1e-12 * rates.max(axis=0) + 1e-14 * far)[[0, -1]]  # up to rounding
-    slow = rest & (bends <= 1e-9 * bends.max(axis=0) + 1e-12 * far)[[0, -1]]
-    slow = slow.all(axis=-1)
-    graded = q * q * (3 - 2 * q), q * q, 1 - (1 - q) ** 2
-    share = np.select([slow.all(axis=0), slow[0], slow[1]], graded, q + np.zeros(L))
-    points = np.minimum(share[:-1] + _INSIDE * np.diff(share, axis=0), 1)
-
-    def along(order: int) -> Array:
-        x = legs.values(points.reshape(-1, L), order)
-        x = x.reshape(*points.shape, *x.shape[2:]).swapaxes(1, 2)
-        return x.reshape(len(points), L * n, *x.shape[3:])
-
-    V, A, R, each = along(1), along(2), along(0)[..., :3, :3], np.repeat(h, n)[:, None]
-    V, A, first = V / each, A / each**2, np.arange(L) * n
-    V[0, first] *= ~np.repeat(rest[0], 3, axis=-1)
-    V[-1, first + n - 1] *= ~np.repeat(rest[1], 3, axis=-1)
-    s = np.append((knots[:-1, None] + h[:, None] * share[:-1].T).ravel(), knots[-1])
-    if (still := (rates <= 1e-14 * far).all(axis=(0, 2))).any():
+    probe = at(np.linspace(0, 1, 5)[:, None])
+    far = np.array([1.0, np.abs(path(probe)[..., :3, 3:]).max(initial=0)])[:halves]
+    v, a = (sizes(path(probe, k)) * h[:, None] ** k for k in (1, 2))
+    if (still := (v <= 1e-14 * far).all(axis=(0, 2))).any():
         i = np.argmax(still)
         between = f", between poses[{i}] and poses[{i + 1}]" if L > 1 else ""
         raise ValueError(f"curve: the path stands still near s = {knots[i]:.6g}{between}")
-    joints, fast = first[1:], sizes(V).max(axis=(0, 1))
-    corners = (sizes(V[0, joints] - V[-1, joints - 1]) > 1e-9 * fast).any(axis=-1)
-    ends = first[slow[0]], first[slow[1]] + n
-    return _Grid(s, V, A, R, np.concatenate([joints[corners], *ends]))
+    rest = (v <= 1e-12 * v.max(axis=0) + 1e-14 * far)[[0, -1]]  # up to rounding
+    slow = (rest & (a <= 1e-9 * a.max(axis=0) + 1e-12 * far)[[0, -1]]).all(axis=-1)
+    q = np.linspace(0, 1, n + 1)[:, None]
+    graded = q * q * (3 - 2 * q), q * q, 1 - (1 - q) ** 2
+    share = np.select([slow.all(axis=0), slow[0], slow[1]], graded, q + np.zeros(L))
+    t = at(share[:-1] + _PLACES * np.diff(share, axis=0)).swapaxes(1, 2)
+    V, A, R = path(t, 1), path(t, 2), path(t)[..., :3, :3]
+    each = V.reshape(*t.shape, halves, 3)
+    each[0, :, 0][rest[0]] = each[-1, :, -1][rest[1]] = 0
+    caps, corners = np.full(L * n + 1, inf), np.append(slow[0], False) | np.append(False, slow[1])
+    jumps = np.abs(each[0, 1:, 0] - each[-1, :-1, -1]).max(axis=-1)
+    corners[1:-1] |= (jumps > 1e-9 * sizes(V).max(axis=(0, 1, 2))).any(axis=-1)
+    caps[::n][corners] = 0
+    near = np.zeros((L, n, 1), bool)
+    near[rest[0].any(axis=-1), : n // 25] = near[rest[1].any(axis=-1), -n // 25 :] = True
+    V, A, R = (x.reshape(len(x), L * n, *x.shape[3:]) for x in (V, A, R))
+    return np.append(t[0], knots[-1]), V, A, R, caps, near.reshape(-1, 1)
 
 
-def _squared_rates(grid: _Grid, limits: _Limits, rates: Array) -> tuple[Array, Array]:
-    """Return x on the grid, and the largest share of a limit that is used in each cell.
-
-    Cells in which a limit is exceeded between the ends are solved again with a lower limit.
-    """
-    s, V, A, R, stops = grid
-    rows, h, X = limits.rows(V, A, R), np.diff(s), np.full(V.shape[:2], inf)
-    with np.errstate(divide="ignore"):
-        for name, a, _, _ in rows:
-            if name in _SPEEDS:
-                X = np.minimum(X, 1 / np.sum(a * a, axis=-1))
-    parts = [row[1:] for row in rows if row[0] in _BENDS]
-    held = np.max([np.linalg.norm(k, axis=-1) for _, _, k in parts], axis=(0, 1))
-    if (held >= 1).any():
-        most, where = held.max(), s[np.argmax(held >= 1)]
-        raise ValueError(
-            f"force: {most:.6g} times the limit is needed to hold the body near s = {where:.6g}"
-        )
-    caps = np.minimum(np.append(X[0], inf), np.append(inf, X[-1]))
-    caps[stops] = 0
-    moving = V[0, 0].any(), V[-1, -1].any()
-    ends = [(r * r, r * r) if v else (0, inf) for r, v in zip(rates.tolist(), moving, strict=True)]
-    scale = np.ones((len(h), 1))
-    for _ in range(_REPEATS):
-        ends_of_cells = [[y[[0, -1]] for y in (scale * a, scale * b, k)] for a, b, k in parts]
-        x = _two_passes(s, ends_of_cells, caps, ends)
-        u, inside = (np.diff(x) / h / 2)[:, None], x[:-1] + _INSIDE[..., 0] * np.diff(x)
-        squares = [np.sum((a * u + b * inside[..., None] + k) ** 2, axis=-1) for a, b, k in parts]
-        share = np.sqrt(np.max([(_BETWEEN @ y).max(axis=0) for y in squares], axis=0))
-        fast = np.sqrt((_BETWEEN @ (inside / X)).max(axis=0))
-        if max(share.max(), fast.max()) < 1 + TOLERANCE / 10:
-            break
-        scale *= 1 + 2 * (np.maximum(share, 1) - 1)[:, None] / (1 - held)[:, None]
-        over = np.maximum(np.append(fast, 1), np.append(1, fast))
-        caps = np.where(over > 1, np.minimum(caps, x) / np.maximum(over, 1) ** 2, caps)
-    return x, np.maximum(share, fast)
-
-
-def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any]) -> Array:
-    """Return x on the grid; `ends` are the least and the greatest allowed x at both ends."""
-    A, B, C, D, E, F = Q = _ellipses(np.diff(s), rows)
+def _two_passes(s: Array, Q: Array, caps: Array, ends: Array, moving: Array) -> Array:
+    """Return x on the grid; `ends` are the values of x at both ends, if the path moves there."""
+    A, B, C, D, E, F = Q
     tops, cap, N = _tops(Q, caps).tolist(), caps.tolist(), len(s) - 1
     there, back, least = (
         np.stack(some).transpose(1, 2, 0).tolist()
         for some in ((A, B, C, D, E, F), (C, B, A, E, D, F), (A, -B, C, -D, E, F))
     )
-    (first, most), (last, most_there) = ends
-    low, high = [0.0] * N + [last], [inf] * N + [min(most_there, cap[N])]
-    if last > high[N] * (1 + 1e-9):
-        raise ValueError("rates[1] is above a limit on a speed")
+    first, last = ends.tolist()
+    low, high = [0.0] * N + [last], [inf] * N + [last if moving[1] else cap[N]]
     for i in range(N - 1, -1, -1):  # find the largest x from which the end can be reached
         high[i] = min(_largest(there[i], max(min(high[i + 1], tops[i]), low[i + 1])), cap[i])
         low[i] = max(0.0, -_largest(least[i], low[i + 1])) if low[i + 1] > 0 else 0.0
@@ -434,7 +378,7 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
             raise ValueError(f"limits: none of them bounds the speed near s = {s[i]:.6g}")
         if low[i] > high[i] * (1 + 1e-9):
             raise ValueError(f"rates[1] is out of reach: a limit is too low near s = {s[i]:.6g}")
-    x = [min(high[0], most)]
+    x = [min(high[0], first) if moving[0] else high[0]]
     if x[0] < max(low[0], first) * (1 - 1e-9):
         why = "too low for rates[1]" if low[0] > x[0] else "too high to brake, or above a limit"
         raise ValueError(f"rates[0] is {why}")
@@ -443,15 +387,21 @@ def _two_passes(s: Array, rows: list[list[Array]], caps: Array, ends: list[Any])
     return np.array(x)
 
 
-def _ellipses(h: Array, rows: list[list[Array]]) -> Array:
-    """Return the coefficients of the limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0."""
+def _ellipses(h: Array, rows: list[Row], near: Array) -> Array:
+    """Return the coefficients of the limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0.
+
+    In cells near rest, where b changes much, limits on speeds use its largest value in the cell.
+    """
     made = []
-    for a, b, k in rows:
-        q = a / (2 * h[:, None])
-        for p, r, c in ((b[0] - q[0], q[0], k[0]), (-q[1], b[1] + q[1], k[1])):
-            A, B, C, D, E, F = np.vecdot([p, p, r, p, r, c], [p, r, r, c, c, c])
-            made.append([A, B, C, D, E, F - 1])
-    return np.stack(made, axis=-1)
+    for name, a, b, k in rows:
+        if name in _SPEEDS:
+            b = np.where(near, b.max(axis=0), b)
+        g = a / (2 * h[:, None])
+        parts = (1 - _PLACES) * b - g, _PLACES * b + g, k
+        p, q, k = (np.tensordot(_CONTROL, part, 1) for part in parts)
+        made.append(np.vecdot([p, p, q, p, q, k], [p, q, q, k, k, k]))
+        made[-1][5] -= 1
+    return np.concatenate(made, axis=1).swapaxes(1, 2)
 
 
 def _tops(Q: Array, caps: Array) -> Array:
@@ -485,8 +435,10 @@ def _largest(ellipses: list[list[float]], y: float) -> float:
     """Return the largest x that all limits of a cell allow for a given y."""
     x = inf
     for A, B, C, D, E, F in ellipses:
-        if A > 0:
-            t, G = B * y + D, (C * y + 2 * E) * y + F
+        t, G = B * y + D, (C * y + 2 * E) * y + F
+        if A == 0:
+            x = -1.0 if G > 1e-9 else x  # this limit concerns y alone
+        else:
             root = sqrt(max(t * t - A * G, 0.0))
             x = min(x, -G / (t + root) if t > 0 else (root - t) / A)
     return x
