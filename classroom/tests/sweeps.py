@@ -16,7 +16,7 @@ def made(name):
 
 
 def sweep(name, **base):
-    """Apply `base` and each setting in turn to a restarted explorer; yield values and texts.
+    """Apply `base` and each setting in turn to a restarted explorer; yield values, texts, artists.
 
     Check that each setting shows values or states why there are none. No text may contain "nan" or
     "-0".
@@ -30,7 +30,7 @@ def sweep(name, **base):
         assert len(said) >= 2 or notice(explorer), setting
         assert not re.search(r"\bnan\b|-0\.?0*(?![.\d])", "\n".join(said.values())), setting
         if not notice(explorer).startswith("Nothing to show"):
-            yield explorer.values, said
+            yield explorer.values, said, explorer.artists
 
 
 def settings(explorer):

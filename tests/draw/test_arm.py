@@ -1,8 +1,8 @@
 """Arms are drawn at the angles of the path, and the descriptions state the numbers of the path."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
 import rbcourse as rb
@@ -13,9 +13,7 @@ PATH = np.array([[0.2, 0.5], [1.0, -0.5], [-2.0, 3.0], [4.0, 0.1]])
 
 @pytest.fixture
 def axes():
-    fig, axes = plt.subplots(1, 2)
-    yield axes
-    plt.close(fig)
+    return Figure().subplots(1, 2)
 
 
 def ends(q, lengths=(2, 1.5)):

@@ -1,8 +1,8 @@
 """Bodies and frames are drawn at the given poses."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import rbcourse as rb
 from rbcourse.draw import bodies
@@ -15,9 +15,7 @@ MOTIONS = {"geodesic": GEODESIC, "screw": SCREW}
 
 @pytest.fixture
 def axes():
-    fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"})
-    yield axes
-    plt.close(fig)
+    return Figure().subplots(1, 2, subplot_kw={"projection": "space"})
 
 
 def off(box, pose, in_body):

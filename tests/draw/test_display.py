@@ -1,8 +1,8 @@
 """A display list, when unpacked, gives the drawn polygons with their places and colours."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.patches import Annulus, Rectangle
 
 import rbcourse as rb
@@ -14,11 +14,8 @@ from rbcourse.draw.display import PARTS, Display, joined
 @pytest.fixture
 def ax():
     """Return axes from 0 to 1 that fill a figure of 300 by 200 pixels."""
-    fig = plt.figure(figsize=(3, 2), dpi=100, layout="none")
-    axes = fig.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(0, 1), ylim=(0, 1))
-    yield axes
-    plt.close(fig)
+    fig = Figure(figsize=(3, 2), dpi=100, layout="none")
+    return fig.add_axes((0, 0, 1, 1), xlim=(0, 1), ylim=(0, 1))
 
 
 def recorded(ax, *artists):
@@ -89,9 +86,7 @@ def test_lines_that_leave_the_picture_keep_their_slope(ax, width):
 
 def test_figures_that_are_too_large_are_refused(ax):
     ax.figure.set_size_inches(16, 4)
-    with pytest.raises(
-        ValueError, match=r"at most 1500 × 1500 pixels are wanted, got \(1600, 400\)"
-    ):
+    with pytest.raises(ValueError, match=r"at most 1500 × 1500 pixels are wanted, got \(1600, 4"):
         Display(ax.figure)
 
 

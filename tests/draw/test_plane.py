@@ -1,8 +1,8 @@
 """Rectangles are drawn at the poses of a path, and the descriptions state its numbers."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import rbcourse as rb
 from rbcourse.draw import plane
@@ -12,9 +12,7 @@ PATH = np.array([[0, 0, 0], [3, 0, 0.5], [3, 2, -2.0], [1, 4, -2.0]])
 
 @pytest.fixture
 def ax():
-    fig, ax = plt.subplots()
-    yield ax
-    plt.close(fig)
+    return Figure().subplots()
 
 
 def way_of(line):

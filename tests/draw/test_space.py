@@ -6,10 +6,10 @@ import sys
 from functools import partial
 from itertools import pairwise
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 from PIL import Image
 
@@ -21,10 +21,9 @@ SIDES = [(elev, azim) for elev in (-50, 5, 60) for azim in (-170, -80, 10, 100)]
 
 @pytest.fixture
 def ax():
-    fig, axes = plt.subplots(figsize=(4, 4), dpi=100, subplot_kw={"projection": "space"})
+    axes = Figure(figsize=(4, 4), dpi=100).add_subplot(projection="space")
     axes.fit(-np.ones(3), np.ones(3))
-    yield axes
-    plt.close(fig)
+    return axes
 
 
 def drawn(ax):
@@ -35,14 +34,14 @@ def drawn(ax):
 
 @pytest.mark.parametrize("fitted", [True, False])
 def test_the_view_agrees_with_matplotlib(fitted):
-    fig, ax = plt.subplots(figsize=(2, 2), subplot_kw={"projection": "space"})
+    ax = Figure(figsize=(2, 2)).add_subplot(projection="space")
     ax.plot([0, 1], [0, 5], [0, 20])
     if fitted:
         ax.fit([0, 0, 0], [1, 5, 2])
     first, places = ax.sight().origin, np.random.default_rng(1).uniform(-1, 1, (20, 3))
     for side in SIDES:
         ax.view_init(*side)
-        fig.canvas.draw()
+        ax.figure.draw_without_rendering()
         sight = ax.sight()
         frame = np.stack([sight.right, sight.up, sight.eye])
         assert np.abs(frame @ frame.T - np.eye(3)).max() < 1e-12
@@ -52,7 +51,6 @@ def test_the_view_agrees_with_matplotlib(fitted):
         x, y, _ = proj_transform(*places.T, ax.get_proj())
         want = ax.transData.transform(np.stack([x, y], axis=-1))
         assert np.abs(sight.flat(sight.scale * (places - sight.middle)) - want).max() < 1e-9
-    plt.close(fig)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +66,7 @@ def test_scenes_that_cannot_be_drawn_are_refused(ax, call, message):
     (line,) = ax.plot([0, 1], [0, 0], [0, 0])
     getattr(ax, call[0])(*call[1:])
     with pytest.raises(ValueError, match=message):
-        ax.figure.canvas.draw()
+        ax.figure.draw_without_rendering()
     assert line.get_visible()
 
 

@@ -1,8 +1,8 @@
 """Spheres show the computed images of vectors."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import rbcourse as rb
 from rbcourse.draw import spheres
@@ -14,7 +14,7 @@ IMAGES = {"one": (V0, V1), "other": (-V0, -V1)}
 
 @pytest.mark.source("RR 2.2", "RR Fig. 4", "RR Fig. 5")
 def test_the_first_images_are_drawn_and_counted():
-    fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"})
+    axes = Figure().subplots(1, 2, subplot_kw={"projection": "space"})
     update = spheres.moving_images(axes, IMAGES)
     assert [ax.get_title() for ax in axes] == list(IMAGES)
     for shown in (17, 50, 1, 0):
@@ -24,7 +24,6 @@ def test_the_first_images_are_drawn_and_counted():
             assert np.array_equal(parts[:, :2], np.stack([v0, v1], axis=1)[:shown])
             assert np.isnan(parts[:, 2]).all()  # one stroke ends before the next begins
             assert np.array_equal(dots, v0[:shown])
-    plt.close(fig)
     table, said = spheres.image_table(IMAGES), spheres.describe_images(IMAGES)
     assert list(table)[:6] == [f"one {v} {axis} [1]" for v in ("v0", "v1") for axis in "xyz"]
     assert np.array_equal(table["other v1 y [1]"], -V1[:, 1])

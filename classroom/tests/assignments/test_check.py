@@ -12,34 +12,19 @@ from types import SimpleNamespace
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
-from nbgrader.preprocessors import ClearHiddenTests, ClearSolutions, ComputeChecksums, LockCells
-from tiny_set import ANSWERS, cell, write_tiny_set
+from tiny_set import answered, cell, write_tiny_set
 
-from rbclassroom.assignments import check
+from rbclassroom.assignments import check, handout
 from rbclassroom.assignments.autograding import BoxedExecute
 from rbclassroom.assignments.locked_cells import grade_id, restore
 
 
 @pytest.fixture(scope="module")
 def release(tmp_path_factory):
-    """Return the tiny set as nbgrader releases it."""
-    path = write_tiny_set(tmp_path_factory.mktemp("assignments"))
-    notebook = nbformat.read(path, as_version=4)
-    for step in (LockCells(), ClearSolutions(), ClearHiddenTests(), ComputeChecksums()):
-        notebook, _ = step.preprocess(notebook, {})
-    return nbformat.writes(notebook)
-
-
-def answered(release, edit=None, **answers):
-    """Return the set with the given answers, and with right answers to the other questions."""
-    notebook = nbformat.reads(release, as_version=4)
-    given = {f"{key}-answer": text for key, text in answers.items()}
-    notebook.metadata.kernelspec.name = "mine"
-    for name, source in {**ANSWERS, "words-answer": "Signs.", **given}.items():
-        cell(notebook, name).source = source
-    if edit:
-        edit(notebook)
-    return notebook
+    """Return the tiny set as it is handed out."""
+    folder = tmp_path_factory.mktemp("assignments")
+    write_tiny_set(folder)
+    return handout.release("ps0", folder)["ps0.ipynb"].decode()
 
 
 @pytest.fixture
@@ -60,20 +45,21 @@ def submitted(path):
     return nbformat.read(path.parent / "to_submit" / "ps0.ipynb", as_version=4)
 
 
-RUN = (
-    "import runpy, sys; sys.modules['nbgrader'] = None; runpy.run_module({!r}, run_name='__main__')"
-)
-
-
 def test_check_writes_the_file_to_submit_without_nbgrader(hand_in):
     half = "half = float(open('points.csv').read()) / 2\nfrom ipywidgets import Output\n"
     half += "with Output():\n    print('inside')"
-    added = new_code_cell("print('é∞', 1)")
-    path = hand_in(lambda notebook: notebook.cells.append(added), half=half)
+    run = "import runpy, sys; sys.modules['nbgrader'] = None; "
+    run += "runpy.run_module('rbclassroom.assignments.check', run_name='__main__')"
+
+    def change(notebook):
+        notebook.metadata.kernelspec.name = "mine"
+        notebook.cells.append(new_code_cell("print('é∞', 1)"))
+
+    path = hand_in(change, half=half)
     (path.parent / "points.csv").write_text("1", encoding="utf-8")
     before = path.read_bytes()
     done = subprocess.run(
-        [sys.executable, "-c", RUN.format("rbclassroom.assignments.check"), "ps0.ipynb"],
+        [sys.executable, "-c", run, "ps0.ipynb"],
         cwd=path.parent,
         capture_output=True,
         encoding="ascii",

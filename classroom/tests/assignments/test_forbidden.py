@@ -47,6 +47,7 @@ def found(source, locked=LOCKED):
         ("import sys\nsys.modules['numpy'] = None", "uses modules"),
         ("import sys\nsys.setprofile(None)", "uses setprofile"),
         ("x.input_transformers_post.append(print)", "uses input_transformers_post"),
+        ("import sys\nsys.modules['IPython'].get_ipython()", "uses get_ipython"),
         ("print(In[-1])", "uses In"),
         ("put = setattr\nput(math, 'isclose', print)", "uses setattr"),
         ("getattr(x, 'mod' + 'ules')", "uses getattr(x, 'mod' + 'ules')"),

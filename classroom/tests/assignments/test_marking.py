@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from test_student_code import student
+from test_student_code import student, told
 
 from rbclassroom.assignments.marking import IN_RADIANS, Drawing, Mistake, Problem, curves_of
-from rbclassroom.assignments.student_code import NotYet
 
 X = [(np.array([1.0, -2.0]), 1), (np.array([0.5, 4.0]), 3)]
 DOUBLE = Problem(
@@ -18,12 +17,6 @@ DOUBLE = Problem(
         Mistake("sign", [[-2 * k * x for x, k in X]]),
     ],
 )
-
-
-def told(problem, source):
-    with pytest.raises(NotYet) as refused:
-        problem.accepts(student(source))
-    return str(refused.value)
 
 
 @pytest.mark.parametrize("text", ["2 * k * x", "list(2 * k * x)", "k * x + k * x + 1e-12"])
@@ -61,10 +54,6 @@ def test_wrong_answers_get_a_hint_or_a_description_of_the_error(body, said):
     text = told(DOUBLE, f"import numpy as np\ndef answer(x, k):\n    {body}")
     assert text == said if said in ("half", "sign", DEGREES) else said in text
     assert all(map(np.array_equal, before, [x for x, _ in DOUBLE.inputs]))
-
-
-def test_a_wrong_number_of_arguments_is_reported():
-    assert "takes 1 positional argument but 2 were given" in told(DOUBLE, "def answer(x): return x")
 
 
 def test_full_turns_are_ignored_if_the_problem_says_so():
@@ -106,10 +95,7 @@ def test_drawings_are_judged_by_their_points(drawing):
         ("ax.plot(t**2, t)", "swapped"),
         ("pass", "Your function drew nothing on the axes that it was given."),
         ("ax.plot(t[1:], t[1:])", "A curve of 5 points is wanted; you drew curves of [4] points."),
-        (
-            "for x in t: ax.plot(x, x**2, '.')",
-            "Draw one line through 5 points; you drew 5 lines of 1 point.",
-        ),
+        ("for x in t: ax.plot(x, x, '.')", "Draw one line through 5 points; you drew 5 lines of 1"),
         ("ax.plot(t, t)", "Point 2 of the curve should be [0.5, 0.25]; yours is [0.5, 0.5]."),
         ("ax.plot(t, t**2)", "The curves are right. The x axis needs a label"),
         ("ax.plot(t, t**2)\n    ax.set_xlabel('t')", "The curves are right. The y axis needs"),

@@ -118,9 +118,7 @@ def examples():
     plan = [(np.array([1, 0, 0]), 3), (np.array([0, 0, 0.5]), 2)]
     poses = one["run_plan"](np.zeros(3), plan)
     seen = one["seen_from_body"](np.array([4, 2, np.pi / 2]), np.array([4.0, 5]))
-    short = [
-        np.degrees(one["short_way"](*np.radians(ends), 0.5)) for ends in ([170, -170], [20, 385])
-    ]
+    short = [np.degrees(one["short_way"](*np.radians(x), 0.5)) for x in ([170, -170], [20, 385])]
     arm = one["arm_angles"](np.array([1.0, 2]), np.array([2, 1.5]))
     mirror = np.diag([1.0, 1, -1])
     return {
@@ -152,14 +150,14 @@ def test_the_examples_in_the_questions_are_right():
 def test_each_set_is_complete(name):
     notebook = SETS[name]
     texts = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
-    numbers = re.findall(r"^## Problem (\d) · .* \(\d+ points\)$", "\n".join(texts), re.MULTILINE)
-    assert 3 <= len(numbers) <= 6
-    assert numbers == [str(number + 1) for number in range(len(numbers))]
     assert texts[0].startswith(f"# Problem set {name[2]}: ")
     assert "After this set you can" in texts[0]
     assert "**Mark scheme.**" in "".join(texts)
     assert any("draw_" in cell.source for cell in notebook.cells)
     assert f"rbclassroom.assignments.check {name}.ipynb" in texts[-1]
+    for cell in notebook.cells:
+        assert cell.metadata.nbgrader.locked != cell.metadata.nbgrader.solution
+        assert not cell.get("outputs")
 
 
 @sets
@@ -175,19 +173,9 @@ def test_the_points_of_the_problems_add_up(name):
         for scheme in re.findall(r"\*\*Mark scheme.\*\*(.*)", cell.source):
             assert sum(map(int, re.findall(r"(\d) points?:", scheme))) == points
     assert given == announced
+    assert list(announced) in [list(range(1, count + 1)) for count in (3, 4, 5, 6)]
     (total,) = re.findall(r"There are (\d+) points", SETS[name].cells[0].source)
     assert sum(given.values()) == int(total)
-
-
-@sets
-def test_the_names_of_cells_are_unique(name):
-    marks = [cell.metadata.nbgrader for cell in SETS[name].cells]
-    assert len({mark.grade_id for mark in marks}) == len(marks)
-    for mark in marks:
-        assert re.fullmatch(r"[A-Za-z0-9_-]+", mark.grade_id)
-        assert mark.schema_version == 3
-        assert mark.locked == (not mark.solution)
-    assert not any(cell.get("outputs") for cell in SETS[name].cells)
 
 
 @problems

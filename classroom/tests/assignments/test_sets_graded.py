@@ -20,6 +20,7 @@ from rbclassroom.assignments.grade import grade
 from rbclassroom.assignments.handout import make_handout, release
 
 FIRST, *_, LAST = SETS
+_, *PROBLEMS = (slug for slug in TABLES[FIRST] if slug != "helpers")
 UNSEEN = "HIDDEN TESTS|MARK SCHEME"
 
 
@@ -42,9 +43,9 @@ def points(name):
 
 
 def wrong(grade_id, source):
-    """Return a wrong answer to a problem of the first set."""
+    """Return a wrong answer to a problem of the first set; one problem and the words stay empty."""
     slug, table = grade_id.removesuffix("-answer"), TABLES[FIRST]
-    if slug not in table:
+    if slug not in PROBLEMS:
         return source
     stub = source.partition("    # YOUR CODE HERE")[0]
     code = table[slug]["mistakes"][-1]["code"][-1]
@@ -53,16 +54,15 @@ def wrong(grade_id, source):
 
 @pytest.fixture(scope="module")
 def course(tmp_path_factory):
-    """Return a course with two graded sets; the first also has wrong and empty submissions.
+    """Return a course with two graded sets, each solved by another student.
 
-    A different student solves each set, so that all sets can be graded in one run.
+    The first set also has a submission with wrong and empty answers.
     """
     folder = tmp_path_factory.mktemp("course")
     shutil.copytree(SOURCE, folder / "source")
     shutil.copy(SOURCE.parent / "nbgrader_config.py", folder)
     model = {c.metadata.nbgrader.grade_id: c.source for n in (FIRST, LAST) for c in SETS[n].cells}
     for name, student, answer in [
-        (FIRST, "untouched", lambda key, source: source),
         (FIRST, "wrong", wrong),
         (FIRST, f"solved {FIRST}", lambda key, source: model[key]),
         (LAST, f"solved {LAST}", lambda key, source: model[key]),
@@ -104,19 +104,17 @@ def test_the_reference_gets_all_points(course, name):
 
 def test_wrong_answers_get_hints_but_no_points(course):
     """For the other sets, test_problems.py checks the hints."""
-    untouched = row(course, FIRST, "untouched")
-    assert float(untouched["total"]) == float(untouched["automatic"]) == 0
-    assert (untouched["by hand"], untouched["remarks"]) == ("", "")
-    assert {row(course, FIRST, "wrong")[key] for key in points(FIRST)[0]} == {"0"}
-    hints = [t["mistakes"][-1]["hint"] for slug, t in TABLES[FIRST].items() if slug != "helpers"]
+    found = row(course, FIRST, "wrong")
+    assert {found[key] for key in (*points(FIRST)[0], "automatic", "total")} == {"0"}
+    assert (found["by hand"], found["remarks"]) == ("", "")
+    text = (course / "feedback" / "wrong" / FIRST / f"{FIRST}.html").read_text("utf-8")
+    page = re.sub(r"\s", "", html.unescape(re.sub(r"<[^>]*>", "", text.split("<body>", 1)[1])))
     unseen = [re.sub(r"\s", "", line) for line in regions(FIRST, UNSEEN)]
     assert len(unseen) > 20
-    for student in ("wrong", "untouched"):
-        text = (course / "feedback" / student / FIRST / f"{FIRST}.html").read_text("utf-8")
-        page = re.sub(r"\s", "", html.unescape(re.sub(r"<[^>]*>", "", text.split("<body>", 1)[1])))
-        assert not [line for line in unseen if line in page]
-        if student == "wrong":
-            assert all(re.sub(r"\s", "", hint[:40]) in page for hint in hints)
+    assert not [line for line in unseen if line in page]
+    hints = [TABLES[FIRST][slug]["mistakes"][-1]["hint"] for slug in PROBLEMS]
+    hints.append("Nothing is written here yet.")
+    assert all(re.sub(r"\s", "", hint[:40]) in page for hint in hints)
 
 
 def files_in(content, place=""):

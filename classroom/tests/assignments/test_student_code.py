@@ -7,11 +7,18 @@ import pytest
 from rbclassroom.assignments.student_code import NotYet, call_student
 
 
-def student(source, name="answer"):
-    """Return a function that is defined as in a notebook."""
+def student(source):
+    """Return the function `answer`, defined as in a notebook."""
     space = {"__name__": "__main__"}
     exec(compile(dedent(source), "<cell>", "exec"), space)
-    return space[name]
+    return space["answer"]
+
+
+def told(problem, source, *seed):
+    """Return why a problem refuses the function of a student."""
+    with pytest.raises(NotYet) as refused:
+        problem.accepts(student(source), *seed)
+    return str(refused.value)
 
 
 BORROWED = {

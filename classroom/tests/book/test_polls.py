@@ -21,9 +21,7 @@ OPTION = re.compile(
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_each_poll_option_has_its_own_explanation(
-    path,
-):
+def test_each_poll_option_has_its_own_explanation(path):
     verdicts = {slide.poll: slide for slide in deck_of(path).shown if slide.kind == "verdict"}
     cells, _ = split_sheet(nbformat.read(path, as_version=4))
     polls.voted(cells)

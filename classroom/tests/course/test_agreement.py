@@ -8,10 +8,10 @@ import zlib
 from functools import partial
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import nbformat
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 from PIL import Image
 
@@ -110,11 +110,10 @@ def test_a_picture_in_a_page_is_kept_if_it_looks_the_same():
 def test_a_different_letter_in_a_large_picture_is_detected():
     plots = []
     for label in ("w1 [rad]", "w2 [rad]", "w1 [rad/s]", "v1 [rad]"):
-        fig, ax = plt.subplots(figsize=(9, 5.5))
-        ax.set_ylabel(label)
+        fig = Figure(figsize=(9, 5.5))
+        fig.add_subplot(ylabel=label)
         plots.append(io.BytesIO())
         fig.savefig(plots[-1], format="png")
-        plt.close(fig)
     first, *others = (plot.getvalue() for plot in plots)
     assert not any(agreement.look_the_same(first, other) for other in others)
 

@@ -108,9 +108,8 @@ def test_an_unknown_key_is_refused(tmp_path):
         assert found[key].lacks() == ["functions", "tests", "lessons"]
     lesson.cells[0].source = "## 1 · Turns\n\n<small>BK (99)</small>"
     nbformat.write(lesson, tmp_path / "notebooks/03_turns.ipynb")
-    with pytest.raises(
-        ValueError, match=r"03_turns\.ipynb, 1: a key of sources\.toml is wanted, got BK \(99\)"
-    ):
+    said = r"03_turns\.ipynb, 1: a key of sources\.toml is wanted, got BK \(99\)"
+    with pytest.raises(ValueError, match=said):
         ledger.collect(tmp_path)
     assert ledger.KEY.findall("beyond BK 3, BK 3, BK 6.1.2") == ["beyond BK 3", "BK 3"]
 

@@ -1,6 +1,6 @@
 """The drawings and texts of explorers agree with the package at all settings of the sliders."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -117,8 +117,7 @@ def turned_books(about, turn, thickness):
 
 @pytest.mark.source("beyond BK 3", "beyond BK 4")
 def test_the_three_books_agree_with_the_package():
-    artists = made("body").artists
-    for v, said in sweep("body", thickness=30.0, t=0.4):
+    for v, said, artists in sweep("body", thickness=30.0, t=0.4):
         curves, G, costs = turned_books(v["about"], v["turn"], v["thickness"])
         half = 4.2 * np.array([0.3, 0.2, v["thickness"] / 100]) / 2
         for (law, panel), curve in zip(PANELS.items(), curves, strict=True):
@@ -137,7 +136,7 @@ def test_the_three_books_agree_with_the_package():
 @pytest.mark.source("BK Prop. 6", "BK Cor. 1")
 def test_the_projected_line_agrees_with_the_package():
     t, f = np.linspace(0, 1, 101), rb.projected_line
-    for v, said in sweep("theta", angle=100.0, t=0.3):
+    for v, said, artists in sweep("theta", angle=100.0, t=0.3):
         a, now = np.radians(v["angle"]), v["t"]
         first, last = ends = 1j * np.exp([0.5j * a, -0.5j * a])
         on = first + now * (last - first)
@@ -152,15 +151,14 @@ def test_the_projected_line_agrees_with_the_package():
             "theta now": [now + 1j * f.theta(now, a)],
         }
         for name, places in wanted.items():
-            assert off(points(made("theta").artists[name]) @ [1, 1j], places) < 1e-14, name
+            assert off(points(artists[name]) @ [1, 1j], places) < 1e-14, name
         known = f.theta(now, a), f.theta(now, a, 1), abs(on)
         assert reads(" ".join(said.values()), known)
 
 
 @pytest.mark.source("BK (10)", "BK (14)")
 def test_the_screw_and_the_geodesic_agree_with_the_package():
-    artists = made("screw").artists
-    for v, said in sweep("screw", tilt=35.0, t=0.6):
+    for v, said, artists in sweep("screw", tilt=35.0, t=0.6):
         tilt, angle, d = np.radians(v["tilt"]), abs(v["angle"]), np.array([v["x"], 0, v["z"]])
         r = np.radians(v["angle"]) * np.array([np.sin(tilt), 0, np.cos(tilt)])
         goal = rb.pose_from_components(rb.exp_so3(r), d)
@@ -207,8 +205,7 @@ def spun(axis, tilt):
 
 @pytest.mark.source("BK (8)")
 def test_the_book_and_its_angular_velocity_agree_with_the_package():
-    artists = made("flip").artists
-    for v, said in sweep("flip", axis="axis 2", t=6.0):
+    for v, said, artists in sweep("flip", axis="axis 2", t=6.0):
         times, R, w = spun(v["axis"], v["off"])
         k = int(np.abs(times - v["t"]).argmin())
         assert times[k] == pytest.approx(v["t"])
@@ -270,8 +267,7 @@ def assert_compared(said, curves, costs, t, rival="projection"):
 
 @pytest.mark.source("BK (19)", "BK (21)", "BK Fig. 4")
 def test_the_optimum_and_its_rivals_agree_with_the_package():
-    artists = made("minimum_acceleration").artists
-    for v, said in sweep("minimum_acceleration", k=3.0):
+    for v, said, artists in sweep("minimum_acceleration", k=3.0):
         sigma = v["size"] * np.pi / 6 * np.array([1, 2, 3])
         ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + v["k"] * np.eye(3)[0]
         curves, costs = solved(rb.minimum_acceleration_so3, RIVALS[v["rival"]], ends)
@@ -292,8 +288,7 @@ def test_the_optimum_and_its_rivals_agree_with_the_package():
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
 def test_both_cubes_agree_with_the_package():
-    artists = made("cube").artists
-    for v, said in sweep("cube", spin=2.0, t=0.4):
+    for v, said, artists in sweep("cube", spin=2.0, t=0.4):
         sigma = v["turn"] * np.pi / 6 * np.array([1, 4, 3])
         A1 = rb.pose_from_coordinates([*sigma, 8, 10, 12])
         ends = np.eye(4), A1, [1, 2, 3], [2, 1, v["spin"]], [1, 1, 1], [1, 5, v["rise"]]
@@ -332,11 +327,10 @@ def curve_of(name, knots):
 
 
 def test_the_box_follows_the_chain():
-    artists = made("chain").artists
-    assert np.array_equal(points(artists["poses"]), POSES[:, :3, 3])
-    for v, said in sweep("chain", curve="cubics, parabolas", duration=4.0, t=0.4):
+    for v, said, artists in sweep("chain", curve="cubics, parabolas", duration=4.0, t=0.4):
         knots, now = v["duration"] * SHARES, v["t"] * v["duration"]
         c = curve_of(v["curve"], knots)
+        assert np.array_equal(points(artists["poses"]), POSES[:, :3, 3])
         way, A, times = points(artists["way"]), c(now), np.linspace(0, v["duration"], 241)
         assert off(way, c(np.linspace(*c.domain, len(way)))[:, :3, 3]) < 1e-12
         assert_box(artists["box"], A[:3, :3], [0.45, 0.3, 0.15], A[:3, 3], 1e-12, 1e-12)
@@ -363,8 +357,7 @@ def test_the_box_follows_the_chain():
 
 @pytest.mark.source("beyond BK 13")
 def test_both_curves_pass_through_the_orientations():
-    artists = made("spline").artists
-    for v, said in sweep("spline", pitch=15.0, third=2.3, t=1.4):
+    for v, said, artists in sweep("spline", pitch=15.0, third=2.3, t=1.4):
         times, angles = np.array([0, 1, v["third"], 4]), ANGLES.copy()
         angles[2, 1] = v["pitch"]
         R = rb.matrix_from_zyx(np.radians(angles))
@@ -398,16 +391,18 @@ def test_both_curves_pass_through_the_orientations():
 
 @pytest.mark.source("beyond BK 16")
 def test_the_timing_stays_below_the_limits_of_its_path():
-    artists, path = made("timing").artists, rb.projected_spline_se3(np.arange(4.0), POSES)
-    for v, said in sweep("timing", angular_speed=1.0, speed=1.2, acceleration=2.5, t=0.3):
-        limits = {name: v[name] for name in ("angular_speed", "speed", "acceleration")}
-        c, s = rb.fastest(path, **limits), np.linspace(0, 3, 241)
+    path = rb.projected_spline_se3(np.arange(4.0), POSES)
+    fastest, s = cache(partial(rb.fastest, path)), np.linspace(0, 3, 241)
+    V, A = path(s, 1), path(s, 2)[:, 3:]
+    turned, moved = (np.linalg.norm(part, axis=1) for part in (V[:, :3], V[:, 3:]))
+    bend = np.linalg.norm(np.cross(V[:, 3:], A), axis=1) / moved  # perpendicular to the path
+    start = {"angular_speed": 1.0, "speed": 1.2, "acceleration": 2.5}
+    for v, said, artists in sweep("timing", **start, t=0.3):
+        limits = {name: v[name] for name in start}
+        c = fastest(**limits)
         assert off(points(artists["fastest"]), np.stack([c.s, c.rate], axis=1)) < 1e-12
-        V, A = path(s, 1), path(s, 2)[:, 3:]
-        turned, moved = (np.linalg.norm(part, axis=1) for part in (V[:, :3], V[:, 3:]))
         speeds = np.minimum(v["angular_speed"] / turned, v["speed"] / moved)
         assert off(points(artists["speed limits"])[:, 1] / speeds, 1) < 1e-12
-        bend = np.linalg.norm(np.cross(V[:, 3:], A), axis=1) / moved  # perpendicular to the path
         highest = points(artists["acceleration limit"])[:, 1]
         assert off(highest**2 * bend / v["acceleration"], 1) < 1e-9
         rate = points(artists["one rate"])[0, 1]
@@ -430,8 +425,7 @@ def planned(v, t, frame):
 
 @pytest.mark.source("RR (17)", "RR (18)", "RR (19)")
 def test_both_bodies_are_at_the_poses_of_the_plan():
-    artists = made("planar").artists
-    for v, said in sweep("planar", omega1=45.0, t=4.0):
+    for v, said, artists in sweep("planar", omega1=45.0, t=4.0):
         for frame in ("world", "body"):
             x, y, theta = planned(v, v["t"], frame)
             way, plan = (points(artists[f"{frame} {name}"]) for name in ("way", "plan"))
@@ -446,8 +440,8 @@ def test_both_bodies_are_at_the_poses_of_the_plan():
 
 
 def test_a_plan_of_two_fast_commands_stays_in_the_picture():
-    outline = made("planar").artists["body outline"]
-    for _ in sweep("planar", t=4.0):
+    for *_, artists in sweep("planar", t=4.0):
+        outline = artists["body outline"]
         assert_within(outline.get_xy(), outline.axes.get_xlim(), outline.axes.get_ylim())
 
 
@@ -457,8 +451,7 @@ def hand(q):
 
 @pytest.mark.source("RR (20)", "RR (21)")
 def test_the_arm_agrees_with_the_package():
-    artists = made("arm").artists
-    for v, said in sweep("arm", theta0=77.0, theta1=-40.0):
+    for v, said, artists in sweep("arm", theta0=77.0, theta1=-40.0):
         goal = np.radians([v["theta0"], v["theta1"]])
         q = (1 - v["t"]) * START + v["t"] * goal
         joints, way = rb.arm.arm_forward_kinematics(q).joints, points(artists["way"])
@@ -501,8 +494,7 @@ def tips(explorer, name):
 @pytest.mark.source("RR (7)", "RR (8)", "RR 2.1")
 def test_the_drawn_box_agrees_with_the_angles():
     orientation, (x, y, z) = made("rotation"), np.eye(3)
-    artists = orientation.artists
-    for v, said in sweep("rotation"):
+    for v, said, artists in sweep("rotation"):
         alpha, beta, gamma = np.radians([v["alpha"], v["beta"], v["gamma"]])
         R = rb.exp_so3(alpha * z) @ rb.exp_so3(beta * y) @ rb.exp_so3(gamma * x)
         assert off(tips("rotation", "body"), R) < 1e-14
@@ -531,8 +523,7 @@ def test_the_drawn_box_agrees_with_the_angles():
 
 @pytest.mark.source("BK Prop. 2")
 def test_matrices_and_their_projections_agree_with_the_package():
-    letter = made("projection").artists["nearest x letter"]
-    for v, said in sweep("projection", pull=1.0, e23=-0.3):
+    for v, said, artists in sweep("projection", pull=1.0, e23=-0.3):
         M = np.eye(3) + v["pull"] * np.array([[0, v["e12"], 0], [0, 0, v["e23"]], [0, 0, v["e33"]]])
         drawn, R, G = (tips("projection", name) for name in ("M", "nearest", "Gram–Schmidt"))
         S, det = R.T @ M, np.linalg.det(M)
@@ -540,7 +531,7 @@ def test_matrices_and_their_projections_agree_with_the_package():
         assert off(S, S.T) < 1e-14  # this defines the nearest rotation
         assert np.linalg.eigvalsh(S)[:2].sum() > -1e-14
         assert np.linalg.det(R) > 0
-        assert off(letter.get_position_3d(), 1.2 * R[:, 0]) < 1e-14
+        assert off(artists["nearest x letter"].get_position_3d(), 1.2 * R[:, 0]) < 1e-14
         assert reads(said["singular values"], np.linalg.svd(M, compute_uv=False))
         assert reads(said["determinant"], det)
         assert reads(said["M to nearest"], np.linalg.norm(M - R))
@@ -560,15 +551,14 @@ def test_matrices_and_their_projections_agree_with_the_package():
 
 @pytest.mark.source("RR 2.1", "RR 2.2")
 def test_dots_and_histogram_show_the_first_rotations():
-    dots, histogram = (made("random").artists[name] for name in ("points", "histogram"))
     samplers = {"three angles": rb.sampling.sample_rotation_naive, "uniform": rb.sample_rotation}
-    for v, said in sweep("random"):
+    for v, said, artists in sweep("random"):
         R = samplers[v["sampler"]](2000, rng=int(v["seed"]))[: int(v["number"])]
         e1 = R[:, :, 0]
-        assert np.array_equal(points(dots), e1)
-        density, edges, _ = histogram.get_data()
+        assert np.array_equal(points(artists["points"]), e1)
+        density, edges, _ = artists["histogram"].get_data()
         assert off(density * np.diff(edges), np.histogram(e1[:, 2], edges)[0] / len(R)) < 1e-14
-        assert density.max() < histogram.axes.get_xlim()[1]
+        assert density.max() < artists["histogram"].axes.get_xlim()[1]
         assert reads(said["|height| > ½"], [100 * np.mean(np.abs(e1[:, 2]) > 0.5), 50])
         for name in ("image of e₁", "angle") if len(R) >= 100 else ():
             p = rb.sampling.uniformity_tests(R)[name].p_value

@@ -4,9 +4,9 @@ When a lesson draws a figure, the figure is compared with the stored one. tests/
 the artists hold the numbers of the CSV, are labelled, and are not clipped.
 """
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from shown import numbers, numbers_of
 
 import rbcourse as rb
@@ -33,16 +33,10 @@ MARGINS = {
 }
 
 
-@pytest.fixture
-def axes():
-    """Return a function that makes axes with the given projections."""
-
-    def make(*kinds):
-        fig = plt.figure()
-        return [fig.add_subplot(2, 3, k, projection=kind) for k, kind in enumerate(kinds, 1)]
-
-    yield make
-    plt.close("all")
+def axes_of(*kinds):
+    """Return the axes of a new figure, with the given projections."""
+    fig = Figure()
+    return [fig.add_subplot(2, 3, k, projection=kind) for k, kind in enumerate(kinds, 1)]
 
 
 def check_held(axes, held):
@@ -94,11 +88,11 @@ def test_descriptions_of_projected_matrices_state_their_numbers():
 
 
 @pytest.mark.source("RR 2")
-def test_histograms_count_all_draws_and_show_the_exact_distributions(axes):
+def test_histograms_count_all_draws_and_show_the_exact_distributions():
     many = {"a": rb.sample_rotation(5000, rng=2), "b": rb.exp_so3(np.zeros((10, 3)))}
     # rounding makes some heights exceed 1
     many["b"][:, 2, 2] += np.finfo(float).eps * np.arange(-5, 5)
-    bins, axes = lesson05.histograms(many), axes(None, None, None)
+    bins, axes = lesson05.histograms(many), axes_of(None, None, None)
     lesson05.draw_histograms(axes, bins)
     for ax, (edges, densities) in zip(axes, bins.values(), strict=True):
         check_held([ax], {("", name): [density] for name, density in densities.items()})
@@ -112,10 +106,10 @@ def test_histograms_count_all_draws_and_show_the_exact_distributions(axes):
 
 
 @pytest.mark.source("BK Fig. 2", "BK Fig. 3")
-def test_the_curves_of_a_family_have_the_colours_of_its_surface(axes):
+def test_the_curves_of_a_family_have_the_colours_of_its_surface():
     angle, t = np.meshgrid(np.arange(1, 23) * np.pi / 24, np.linspace(0, 1, 5), indexing="ij")
     table = {"angle [rad]": angle, "t [1]": t, "theta [1]": rb.projected_line.theta(t, angle)}
-    ax, space = axes(None, "3d")
+    ax, space = axes_of(None, "3d")
     lesson06.draw_family(ax, table)
     rows = {"30°": 3, "90°": 11, "150°": 19, "165°": 21}
     check_held([ax], {("", name): [t[0], table["theta [1]"][k]] for name, k in rows.items()})
@@ -139,9 +133,9 @@ def test_the_curves_of_a_family_have_the_colours_of_its_surface(axes):
 
 
 @pytest.mark.source("BK Fig. 4")
-def test_lines_that_are_not_in_the_table_are_labelled(axes):
+def test_lines_that_are_not_in_the_table_are_labelled():
     chord, torques, sigma = map(numbers, ("lesson06_chord", "lesson13_torques", "paper_fig4c"))
-    first, second, *others = axes(None, None, None, None, None)
+    first, second, *others = axes_of(None, None, None, None, None)
     lesson06.draw_chord(first, chord)
     _, x, y, *arc = chord.values()
     check_held([first], {("", "equal steps on the chord"): [x, y], ("", "their proj"): arc})
@@ -151,7 +145,7 @@ def test_lines_that_are_not_in_the_table_are_labelled(axes):
     lesson13.draw_torques(others, torques)
     laws = vectors("{} {} [N m]", torques).items()
     check_held(others, {(law, "‖τ‖"): [np.linalg.norm(x, axis=-1)] for law, x in laws})
-    fig = plt.figure()
+    fig = Figure()
     lesson09.draw_comparison(fig, sigma)
     best, near = vectors("{} sigma{} [rad]", sigma, "123").values()
     held = {("", f"σ{'₁₂₃'[i]}"): [part] for i, part in enumerate((near - best).T)}
@@ -202,12 +196,12 @@ def test_descriptions_of_free_and_carried_bodies_state_their_numbers():
     check_said(lesson08.describe_carried(np.radians([0, 90, 180])), "After 0, 90, 180 degrees")
 
 
-def test_descriptions_of_the_atlas_state_its_numbers(axes):
+def test_descriptions_of_the_atlas_state_its_numbers():
     size, table = np.array([0.25, 1, 3]), {}
     for k, way in enumerate(("projection", "Bézier", "normal"), 1):
         table |= {f"{way} median excess [1]": k * 1e-3 * size**4}
         table |= {f"{way} 90 % excess [1]": k * 1e-2 * size**4}
-    table["size [rad]"], (ax,) = size, axes(None)
+    table["size [rad]"], (ax,) = size, axes_of(None)
     words = "projection from 3.9e-06 to 8.1e-02", "normal from 1.2e-05 to 2.4e-01"
     check_said(atlas_figures.describe_growth(table), *words)
     atlas_figures.draw_growth(ax, table)  # the figure has only the curves in the table
@@ -226,8 +220,8 @@ def test_descriptions_of_the_atlas_state_its_numbers(axes):
     check_said(said, f"Bézier d {1 / 16 / 12 / 9:.1e}")
 
 
-def test_each_problem_has_the_marker_of_its_family(axes):
-    axes, line, held = axes(None, None), np.array([0.02, 0.7]), {}
+def test_each_problem_has_the_marker_of_its_family():
+    axes, line, held = axes_of(None, None), np.array([0.02, 0.7]), {}
     atlas_figures.draw_margins(axes, MARGINS)
     for way in ("projection", "quaternion"):
         points = np.array([MARGINS[f"{way} {name} [1]"] for name in ("margin", "excess")])
@@ -237,8 +231,8 @@ def test_each_problem_has_the_marker_of_its_family(axes):
     check_held(axes, held | {("projection", "slope −3"): [line, line**-3]})
 
 
-def test_profiles_show_the_times_of_poses(axes):
-    axes = axes(None, None)
+def test_profiles_show_the_times_of_poses():
+    axes = axes_of(None, None)
     data = {"t [s]": [0, 1, 2], "speed [m/s]": [0, 2.5, 1], "turn [rad/s]": [1, 0, 0.25]}
     lesson14.draw_profiles(axes, data, [0, 1.5])
     assert [ax.get_ylabel() for ax in axes] == ["speed\n(m/s)", "turn\n(rad/s)"]
@@ -271,7 +265,7 @@ def test_profiles_agree_with_the_motion():
 
 
 @pytest.mark.source("beyond BK 7")
-def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
+def test_free_motions_are_straight_in_normal_coordinates_to_second_order():
     """Free motions deviate from the lines t w by O(w²) in exponential coordinates, and by O(w³) in
     normal coordinates."""
     book, t = rb.metrics.box_inertia([0.30, 0.20, 0.03]), np.linspace(0, 1, 5)
@@ -294,7 +288,7 @@ def test_free_motions_are_straight_in_normal_coordinates_to_second_order(axes):
     assert off(book, 0.01)[0, :, -1] == pytest.approx(want, abs=0.03 * np.abs(want).max())
     assert np.abs(off(2 * np.eye(3), 1)).max() < 1e-13  # for a ball, both motions are straight
 
-    data, panes = numbers("lesson13_normal"), axes(None, None)
+    data, panes = numbers("lesson13_normal"), axes_of(None, None)
     lesson13.draw_normal(panes, data)
     for ax, kind in zip(panes, kinds, strict=True):
         motions = [np.transpose([data[f"{kind} {k} {x} [rad]"] for x in "xy"]) for k in (1, 8)]
@@ -319,21 +313,14 @@ def test_the_turns_are_natural_splines_through_the_angles():
 
 def test_limit_curves_are_the_largest_admissible_rates():
     """The test tries many changes of the rate at each place."""
-    path = rb.minimum_acceleration_se3(
-        np.eye(4),
-        rb.pose_from_coordinates([1, 0, 1, 2, 1, 0]),
-        [0, 1, 0],
-        [1, 0, 0],
-        [1, 0, 0],
-        [0, 2, 1],
-    )
+    poses = np.eye(4), rb.pose_from_coordinates([1, 0, 1, 2, 1, 0])
+    path = rb.minimum_acceleration_se3(*poses, [0, 1, 0], [1, 0, 0], [1, 0, 0], [0, 2, 1])
     limits = {"speed": 1.5, "angular_speed": 0.7, "acceleration": 2.0, "angular_acceleration": 1.0}
     s = np.linspace(0, 1, 9)
     found = lesson15.highest_rates(path, s, limits)
     V, A = (path(s, k).reshape(9, 2, 3) for k in (1, 2))
-    assert found["speeds"] == pytest.approx(
-        np.min([0.7, 1.5] / np.linalg.norm(V, axis=2), axis=1), rel=1e-12
-    )
+    speeds = np.min([0.7, 1.5] / np.linalg.norm(V, axis=2), axis=1)
+    assert found["speeds"] == pytest.approx(speeds, rel=1e-12)
     ratios = np.linspace(-60, 60, 240_001)[:, None, None]  # u/x
     for i, rate in enumerate(found["accelerations"]):
         norms = np.linalg.norm(V[i] * ratios + A[i], axis=2) / [1.0, 2.0]
@@ -351,7 +338,7 @@ def test_two_passes_give_the_largest_squared_rates_below_all_limits():
     assert back == pytest.approx(later.min(axis=1))
 
 
-def test_a_used_share_is_a_norm_divided_by_its_limit(axes):
+def test_a_used_share_is_a_norm_divided_by_its_limit():
     path = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0, 0, 2, 3, 0, 0]))
     data = lesson15.share_table(path, {"angular_speed": 4.0, "speed": 5.0})
     assert data["angular speed [1]"] == pytest.approx(0.5)

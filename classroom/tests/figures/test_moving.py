@@ -1,8 +1,8 @@
 """Animations of the lessons follow the mathematics in every frame."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import rbcourse as rb
 from rbclassroom.figures import lesson08, lesson11
@@ -17,9 +17,8 @@ V = np.array([0, -0.8, 0.6])
 @pytest.fixture
 def axes():
     """Return axes in the plane, and in space."""
-    fig = plt.figure()
-    yield [fig.add_subplot(1, 2, k, projection=kind) for k, kind in ((1, None), (2, "space"))]
-    plt.close(fig)
+    fig = Figure()
+    return [fig.add_subplot(1, 2, k, projection=kind) for k, kind in ((1, None), (2, "space"))]
 
 
 def places(artist):

@@ -22,7 +22,6 @@ from rbclassroom.assignments import grade as grading
 from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.grade import grade
 
-SQUARE = ANSWERS["square-answer"]
 PIXEL = (
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNk+A8AAQUBAScY42YAAAAASUVORK5CYII="
 )
@@ -152,7 +151,6 @@ def add_cell(notebook):
 
 
 CELL_5 = "cell 5, answer of “A tiny set”"
-TRANSFORMS = "import sys\nsys.modules['IPython'].get_ipython().input_transformers_post.append(abs)"
 CHANGES = {"writes words": write_words, "adds a cell": add_cell, "forges remarks": forge_remarks}
 SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
 # Each row has a student, an answer, points (none if refused), and how the remark begins.
@@ -169,34 +167,19 @@ OTHERS = [
     ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
     ("ends itself", "import os\nos.kill(os.getpid(), 9)", " ", "Python ended in or before cell 5"),
     # test_forbidden.py has more ways to circumvent the tests.
-    ("transforms", TRANSFORMS, " ", f"{CELL_5}, line 2 uses get_ipython; grade by hand"),
-    ("an alias", "m = [math][0]\nm.isclose = print", " ", f"{CELL_5}, line 2 replaces m.isclose"),
-    ("a shell", "!ls", " ", f"{CELL_5}, line 1 uses a magic or a shell"),
+    ("a shell", "\n!ls", " ", f"{CELL_5}, line 2 uses a magic or a shell; grade by hand"),
     ("[ab]*", "half = 0.5", " ", "the name of the folder contains [, * or ?; rename the folder"),
 ]
+NOT_UTF8 = "ps0.ipynb is not in plain UTF-8; collect it"
+DAMAGED = "ps0.ipynb is damaged or not a notebook"
 FILES = [
     ("crlf", lambda good: good.replace(b"\n", b"\r\n"), "2 1", ""),
-    (
-        "bom",
-        lambda good: codecs.BOM_UTF8 + good,
-        " ",
-        "ps0.ipynb is not in plain UTF-8; collect it",
-    ),
-    ("utf-16", lambda good: good.decode().encode("utf-16"), " ", "ps0.ipynb is not in plain UTF-8"),
-    ("half a file", lambda good: good[:999], " ", "ps0.ipynb is damaged or not a notebook"),
-    (
-        "deep",
-        lambda good: b'{"cells": ' + b"[" * 10**5,
-        " ",
-        "ps0.ipynb is damaged or not a notebook",
-    ),
+    ("bom", lambda good: codecs.BOM_UTF8 + good, " ", NOT_UTF8),
+    ("utf-16", lambda good: good.decode().encode("utf-16"), " ", NOT_UTF8),
+    ("half a file", lambda good: good[:999], " ", DAMAGED),
+    ("deep", lambda good: b'{"cells": ' + b"[" * 10**5, " ", DAMAGED),
     ("long", lambda good: b" " * 31_000_000, " ", "ps0.ipynb has more than 30,000,000 bytes"),
-    (
-        "more files",
-        lambda good: good,
-        " ",
-        "the folder has more files than ps0.ipynb: remove feedback.html",
-    ),
+    ("more files", lambda good: good, " ", "the folder has more files than ps0.ipynb: remove feed"),
 ]
 RESULTS = [(student, *result) for student, _, *result in OTHERS + FILES]
 RESULTS += [("a link", " ", "ps0.ipynb or a file or folder beside it is a link")]
@@ -252,11 +235,6 @@ def course(tmp_path_factory, template):
     return course
 
 
-@pytest.fixture(scope="module")
-def rows(course):
-    return course.rows()
-
-
 def state(folder):
     """Return the files that grading must not change."""
     paths = [*folder.glob("source/**/*"), *folder.glob("submitted/**/*")]
@@ -264,9 +242,9 @@ def state(folder):
 
 
 @pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
-def test_each_submission_gets_the_expected_points_and_remark(course, rows, student, wanted, remark):
+def test_each_submission_gets_the_expected_points_and_remark(course, student, wanted, remark):
     """Large outputs cost no points. If a row gives None as the remark, any text is accepted."""
-    row = rows["'" * student.startswith("=") + student]
+    row = course.rows()["'" * student.startswith("=") + student]
     assert f"{row['square-test']} {row['half-test']}" == wanted, row
     assert row["remarks"].isprintable()
     assert len(row["remarks"]) < 700
@@ -282,10 +260,10 @@ def test_attempts_to_leave_the_sandbox_fail(course, student):
     assert {output.get("ename") for output in answer.outputs} & REFUSALS, answer.outputs
 
 
-def test_nothing_outside_the_sandbox_is_changed(course, rows):
+def test_nothing_outside_the_sandbox_is_changed(course):
     assert state(course.folder) == course.before
     assert not (Path(rbcourse.__file__).parent / "mine.py").exists()
-    assert {row["boxed"] for row in rows.values()} == {"yes"}
+    assert {row["boxed"] for row in course.rows().values()} == {"yes"}
     assert not [job for job in psutil.process_iter(["cmdline"]) if SLEEP in str(job.info)]
 
 
@@ -335,10 +313,7 @@ def test_grading_without_a_sandbox_is_announced_or_refused(tmp_path, template, m
 
 @pytest.mark.parametrize(
     ("who", "said"),
-    [
-        ("bob", "bob has .* points"),
-        ("ann", "The points of ann changed during the grading of bob"),
-    ],
+    [("bob", "bob has .* points"), ("ann", "The points of ann changed during the grading of bob")],
 )
 def test_points_written_by_a_submission_are_detected(tmp_path, template, who, said, monkeypatch):
     """A submission gives itself points above the maximum, or changes another student's points."""

@@ -16,6 +16,9 @@ from urllib.parse import urlencode
 import nbformat
 import pytest
 import yaml
+from jupyter_client.jsonutil import json_default
+from jupyter_client.session import Session
+from jupyter_server.services.kernels.connection.base import deserialize_binary_message
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
@@ -111,26 +114,16 @@ async def run_cells(address, token, sources):
     channel = f"{address}/api/kernels/{kernel['id']}/channels".replace("http", "ws", 1)
     headers = {"Authorization": f"token {token}"}
     socket_ = await websocket_connect(HTTPRequest(channel, headers=headers), max_message_size=2**28)
-    texts, errors = [], []
+    session, texts, errors = Session(), [], []
     for source in sources:
-        asked = uuid.uuid4().hex
-        header = {"msg_id": asked, "msg_type": "execute_request", "version": "5.3"}
-        header |= {"username": "", "session": asked, "date": "2026-01-01T00:00:00Z"}
-        content = {"code": source, "silent": False, "store_history": True, "allow_stdin": False}
-        content |= {"user_expressions": {}, "stop_on_error": True}
-        rest = {"parent_header": {}, "metadata": {}, "channel": "shell"}
-        await socket_.write_message(json.dumps({"header": header, "content": content, **rest}))
+        request = {**session.msg("execute_request", {"code": source}), "channel": "shell"}
+        await socket_.write_message(json.dumps(request, default=json_default))
         texts.append("")
         while True:
             raw = await socket_.read_message()
-            if isinstance(
-                raw, bytes
-            ):  # a binary message begins with the number and the places of its parts
-                begins = [int.from_bytes(raw[k : k + 4], "big") for k in (4, 8)]
-                raw = raw[slice(*begins)]
-            message = json.loads(raw)
+            message = deserialize_binary_message(raw) if isinstance(raw, bytes) else json.loads(raw)
             kind, content = message["header"]["msg_type"], message["content"]
-            if message["parent_header"].get("msg_id") != asked:
+            if message["parent_header"].get("msg_id") != request["msg_id"]:
                 continue
             if kind == "stream":
                 texts[-1] += content["text"]

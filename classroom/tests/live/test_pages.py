@@ -1,19 +1,15 @@
 """Pages with a problem set say how to use their buttons, and do not mention Jupyter's commands."""
 
-from pathlib import Path
-
 import nbformat
 import pytest
+from test_problems import SETS, SOURCE
 
 from rbclassroom.assignments.handout import release
 from rbclassroom.live.pages import mark_problems
 
-ASSIGNMENTS = Path(__file__).parents[3] / "notebooks" / "assignments"
-SETS = sorted(path.stem for path in ASSIGNMENTS.glob("source/ps*/ps*.ipynb"))
-
 
 def released(name):
-    return nbformat.reads(release(name, ASSIGNMENTS)[f"{name}.ipynb"].decode(), as_version=4)
+    return nbformat.reads(release(name, SOURCE.parent)[f"{name}.ipynb"].decode(), as_version=4)
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -27,7 +23,7 @@ def test_a_page_explains_its_buttons_and_no_command(name):
 
 
 def test_a_missing_sentence_is_named():
-    notebook = released(SETS[0])
+    notebook = released("ps1")
     for cell in notebook.cells:
         cell.source = cell.source.replace("Save the notebook", "Save your notebook")
     with pytest.raises(ValueError, match="problem set: the sentence 'Save the notebook"):

@@ -1,5 +1,7 @@
 """Test the atlas: its problems, the costs of curves, and the quantiles."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -42,9 +44,7 @@ def test_random_problems_are_uniform_in_balls():
         assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
 
 
-@pytest.mark.parametrize(
-    "make", [atlas.atlas_problems, lambda n, rng: atlas.random_problems(n, 1, rng=rng)]
-)
+@pytest.mark.parametrize("make", [atlas.atlas_problems, partial(atlas.random_problems, size=1)])
 def test_the_same_seed_gives_the_same_problems(make):
     one, again, other = make(2, rng=5), make(2, rng=5), make(2, rng=6)
     assert all(np.array_equal(a, b) for a, b in zip(one, again, strict=True))
