@@ -94,14 +94,15 @@ def closed_forms(sigma, w0, w1, n):
     return points[0], half @ moved @ half.mT @ points[0] @ moved, E
 
 
+def triple_brackets(s, e, d, n):
+    """Return the eight brackets [x, [y, z]] of degree three in (9) of docs/near_optimal.md."""
+    triples = (s, s, e), (s, s, d), (s, e, d), (e, s, e), (e, s, d), (e, e, d), (d, s, d), (d, e, d)
+    return [bracket(x, bracket(y, z, n), n) for x, y, z in triples]
+
+
 def deviation(s, e, d, n):
     """Return the coefficients of (9) of docs/near_optimal.md, in powers of u."""
-
-    def triple(x, y, z):
-        return bracket(x, bracket(y, z, n), n)
-
-    sse, ssd, sed, ese = (triple(*x) for x in ((s, s, e), (s, s, d), (s, e, d), (e, s, e)))
-    esd, eed, dsd, ded = (triple(*x) for x in ((e, s, d), (e, e, d), (d, s, d), (d, e, d)))
+    sse, ssd, sed, ese, esd, eed, dsd, ded = triple_brackets(s, e, d, n)
     return [
         -ssd / 108 + 17 * sed / 1080 - 13 * esd / 1080 + 97 * eed / 15120,
         -sse / 90 - 3 * ese / 180 - dsd / 720 + 55 * ded / 30240,
@@ -155,8 +156,7 @@ def excess(R, n):
 @pytest.mark.source("beyond BK 10")
 @pytest.mark.parametrize("n", [4, 5])
 def test_the_excess_agrees_with_the_note_in_higher_dimensions(n):
-    """The excess of Bézier's curve is E. The excess of the corrected curve grows as the eighth
-    power of the size of the data."""
+    """Bézier's curve has the excess E; the excess of the corrected curve is of eighth order."""
     d = n * (n - 1) // 2
     for data in np.random.default_rng(n).normal(size=(20, 3, d)):
         data *= [[0.6], [0.8], [1.0]] / np.linalg.norm(data, axis=1, keepdims=True)
@@ -173,9 +173,5 @@ def test_the_eight_brackets_are_independent_on_so3():
     """No other brackets have degree three, so the derivation on SO(3) holds on every group."""
     rows = []
     for vectors in np.random.default_rng(2).integers(-3, 4, (6, 3, 3)):
-        s, e, d = (as_so3(x) for x in vectors)
-        words = ["sse", "ssd", "sed", "ese", "esd", "eed", "dsd", "ded"]
-        named = {"s": s, "e": e, "d": d}
-        triples = [[named[k] for k in word] for word in words]
-        rows.append([bracket(x, bracket(y, z, 3), 3) for x, y, z in triples])
-    assert np.linalg.matrix_rank(np.concatenate([np.transpose(row) for row in rows])) == 8
+        rows += np.transpose(triple_brackets(*map(as_so3, vectors), 3)).tolist()
+    assert np.linalg.matrix_rank(rows) == 8

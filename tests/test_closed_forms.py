@@ -142,8 +142,7 @@ def exactly(name, given, times):
 
 
 def test_the_exponential_of_quaternions_has_exact_derivatives():
-    """The tested lengths are inside and outside the range of the power series, and at the poles of
-    the tangent."""
+    """Lengths are inside and outside the range of the power series, and at poles of the tangent."""
     lengths = [0, 1e-300, 1e-170, 1e-12, 1e-8, 1e-4, 0.1, 0.49, 0.5 - 1e-9, 0.5, 0.51, 1, 1.5]
     lengths += [np.pi / 2, 3, np.pi - 1e-8, np.pi, 3 * np.pi / 2, 2 * np.pi, 7, 50, 400]
     u0, u1, u2 = np.random.default_rng(5).normal(size=(3, 3, 1))
@@ -241,8 +240,6 @@ def test_the_long_and_the_short_way_add_up_to_a_full_turn(make):
 
 
 def test_errors_name_the_ends_that_are_outside_the_domain():
-    """Errors are raised for speeds of 3π or more (Bézier), half-turns (Cayley) and inertias of
-    impossible bodies."""
     w, half = np.zeros((2, 3, 3)), np.diag([-1.0, 1, -1])
     w[1, 2] = 3 * np.pi * np.array([2, 1, 2]) / 3
     for name, given in (("w0", (w, REST)), ("w1", (REST, w))):
@@ -363,14 +360,11 @@ def test_a_zero_of_the_quaternion_cubic_is_refused():
     stack = rb.quaternion_cubic_so3(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
     assert stack.margin[1] < 20 * EPS
     assert abs(stack.margin_time[1] - 0.5) < 1e-12
-    t = np.linspace(0, 0.4, 3000)  # for two curves, these times fill more than one block
     for order in (0, 1, 2):
         assert np.isfinite(stack([0, 0.25, 0.75, 1], order)).all()
-        for k in (0, 2999):
-            times = np.where(np.arange(3000) == k, 0.5, t)
-            for curve, name in ((stack[1], ""), (stack, r" of curve \[1\]")):
-                with pytest.raises(ValueError, match=rf"^t = 0\.5{name}: the cubic of quaternions"):
-                    curve(times, order)
+        for curve, name in ((stack[1], ""), (stack, r" of curve \[1\]")):
+            with pytest.raises(ValueError, match=rf"^t = 0\.5{name}: the cubic of quaternions"):
+                curve([0.25, 0.5], order)
 
 
 BOOK = np.diag([1.0, 2.22, 3.18])

@@ -58,6 +58,9 @@ MAKERS = {
     "stationary_so3": of(lambda R0, R1, w0, w1: rb.stationary_so3(bezier(R0, R1, w0, w1))),
     "minimum_acceleration_so3 of a body": of(rb.minimum_acceleration_so3, "inertia"),
     "minimum_acceleration_se3 of a body": of(rb.minimum_acceleration_se3, "inertia"),
+    "minimum_acceleration_se3 off centre": of(
+        partial(rb.minimum_acceleration_se3, centre=[0.1, -0.2, 0.3])
+    ),
     "projected_line_so3 with f": of(timed),
     "retime of a projection": of(lambda R0, R1, w0, w1: rb.retime(cubic(R0, R1, w0, w1), 0.5)),
 }

@@ -66,8 +66,7 @@ def test_rotation_vectors_and_quaternions_agree_with_mpmath():
 
 @pytest.mark.source("RR 2.1", "RR (7)", "RR (8)")
 def test_zyx_angles_agree_with_the_printed_product_and_scipy():
-    """The test uses random angles, multiples of π/4, and angles within 1e-12 … 1e-3 of gimbal
-    lock."""
+    """Angles are random, multiples of π/4, and within 1e-12 … 1e-3 of gimbal lock."""
     quarter = np.pi / 4 * np.array(np.meshgrid(*3 * [np.arange(-8, 9)])).reshape(3, -1).T
     near = RNG.uniform(-3, 3, size=(40, 3))
     near[:, 1] = RNG.choice([-1, 1], 40) * (np.pi / 2 - 10.0 ** RNG.uniform(-12, -3, 40))

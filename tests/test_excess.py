@@ -1,10 +1,11 @@
-import importlib.util
 import itertools
 import re
 from functools import cache, partial
 from pathlib import Path
 
+import near_optimal as exact
 import numpy as np
+import ordering
 import pytest
 
 import rbcourse as rb
@@ -13,17 +14,6 @@ from rbcourse.bezier import bezier_deviation
 from rbcourse.curves import Ends
 
 ROOT = Path(__file__).parents[1]
-
-
-def supplement(name):
-    """Return a module of docs/."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / f"docs/{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-exact, ordering = supplement("near_optimal"), supplement("ordering")
 FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)
 
 
@@ -187,16 +177,15 @@ def test_the_leading_term_of_the_excess_agrees_with_the_solver(name):
     assert min(errors[0] / errors[1], errors[1] / errors[2]) > least
 
 
-OVER = {"projected_cubic_so3": 6300, "quaternion_cubic_so3": 256 * 6300, "cayley_cubic_so3": 2800}
-
-
-@pytest.mark.parametrize(("name", "over"), OVER.items())
+@pytest.mark.parametrize(
+    ("name", "over"), [("projected", 6300), ("quaternion", 256 * 6300), ("cayley", 2800)]
+)
 def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
     """With e = d = 0 the curves deviate at fifth order, so ∫ ‖w'‖² is ‖σ‖¹⁰/`over` to leading
     order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
-    curves = rb.CLOSED_FORMS[name](I3, rb.exp_so3(sigma), sigma, sigma)
+    curves = rb.CLOSED_FORMS[f"{name}_cubic_so3"](I3, rb.exp_so3(sigma), sigma, sigma)
     found = rb.acceleration_cost(curves) / 2 * over / sizes**10
     assert found == pytest.approx(1, abs=0.1)
     assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # the relative error is of second order
@@ -205,14 +194,11 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
 def test_the_excess_of_the_corrected_curve_grows_as_the_eighth_power():
     """In excesses from the solver, only the median shows the power. The estimate is accurate for
     smaller excesses, too, and shows the power for each problem."""
-    (large, _), (middle, middle_one), (_, small_one) = (
-        (excess, rb.excess_estimate(curves))
-        for curves, excess in (
-            solved("corrected_bezier_so3", 20, 1.0, 7, s) for s in (0.9, 0.6, 0.4)
-        )
-    )
+    found = [solved("corrected_bezier_so3", 20, 1.0, 7, s) for s in (0.9, 0.6, 0.4)]
+    large, middle, _ = (excess for _, excess in found)
     assert 7.5 < np.median(np.log(large / middle) / np.log(1.5)) < 8.5
-    powers = np.log(middle_one / small_one) / np.log(1.5)
+    _, middle, small = (rb.excess_estimate(curves) for curves, _ in found)
+    powers = np.log(middle / small) / np.log(1.5)
     assert 7.5 < powers.min() <= powers.max() < 8.5
 
 
@@ -231,8 +217,7 @@ def test_the_estimate_is_nan_or_right_within_5_percent(name):
 
 
 def test_the_correction_turns_in_the_direction_of_beziers_curve():
-    """The velocities require the long way round. A correction by the short way would cost far
-    more."""
+    """The velocities require the long way; a correction by the short way would cost far more."""
     rng = np.random.default_rng(2)
     turn = np.radians(170) * np.array([0, 0, 1.0]) + 0.1 * rng.normal(size=(20, 3))
     ends = I3, rb.exp_so3(turn), *([0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3)))
@@ -299,6 +284,5 @@ def test_the_latex_source_has_the_formulas_of_the_note():
     body = latex[latex.index(r"\begin{document}") :]
     there = re.findall(r"\\\[(.+?)\\\]|\\\((.+?)\\\)", body, re.DOTALL)
     assert len(here) > 200
-    assert [re.sub(r"\s", "", x + y) for x, y in here] == [
-        re.sub(r"\s", "", x + y) for x, y in there
-    ]
+    here, there = ([re.sub(r"\s", "", x + y) for x, y in pairs] for pairs in (here, there))
+    assert here == there

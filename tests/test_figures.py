@@ -5,6 +5,7 @@ import re
 import numpy as np
 import oracles
 import pytest
+from optima import ALONG, PAPER
 from scipy.integrate import simpson, solve_ivp
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 from shown import FIGURES, numbers
@@ -51,7 +52,7 @@ def test_every_figure_has_complete_files_and_legible_letters(name):
     assert 13.5 * room / width >= 26
 
 
-D, W, LONG = np.pi / 180, 2 * np.pi, np.linalg.norm(np.pi / 6 * np.array([1, 4, 3]))
+D, W, LONG = np.pi / 180, 2 * np.pi, np.linalg.norm(PAPER["5"][0])
 CHORD = np.exp(150j * D)
 SECONDS = np.array([0, 3, 4, 6, 9]) / 9
 
@@ -176,22 +177,18 @@ def test_the_numbers_of_paper_fig2_and_fig3_are_right(name, column, order):
         assert value[i] == pytest.approx(oracle(t[i], angle[i], order), rel=1e-9, abs=1e-10)
 
 
-SIGMA = np.pi / 6 * np.array([1, 2, 3])
-
-
 @pytest.mark.source("BK Fig. 4", "BK (21)")
 @pytest.mark.parametrize(("name", "extra"), [("4a", 0), ("4b", 1), ("4c", 5)])
 def test_the_numbers_of_paper_fig4_are_right(name, extra):
-    """SciPy computes the optimum; the projection must satisfy the definition of the nearest
-    rotation."""
+    """SciPy computes the optimum; the projection must satisfy its definition."""
     data = numbers(f"paper_fig{name}")
-    t, w1 = data["t [1]"], SIGMA + np.array([extra, 0, 0])
+    t, w1 = data["t [1]"], ALONG + np.array([extra, 0, 0])
     best, near = (columns(data, f"{x} sigma{{}} [rad]", "123") for x in ("optimum", "projection"))
-    solution = oracles.minimum_acceleration(SIGMA, SIGMA, w1)
+    solution = oracles.minimum_acceleration(ALONG, ALONG, w1)
     want = oracles.rotation_of_quaternions(solution.sol(t)[:4])
     assert np.abs(np.array([oracles.exp_so3(s) for s in best]) - want).max() < 1e-9
-    R1 = oracles.exp_so3(SIGMA)
-    V0, V1 = np.cross(SIGMA, np.eye(3)).T, R1 @ np.cross(w1, np.eye(3)).T
+    R1 = oracles.exp_so3(ALONG)
+    V0, V1 = np.cross(ALONG, np.eye(3)).T, R1 @ np.cross(w1, np.eye(3)).T
     u = t[:, None, None]
     M = np.eye(3) + V0 * u + (3 * (R1 - np.eye(3)) - 2 * V0 - V1) * u**2
     M = M + (2 * (np.eye(3) - R1) + V0 + V1) * u**3
@@ -202,8 +199,7 @@ def test_the_numbers_of_paper_fig4_are_right(name, extra):
 
 @pytest.mark.source("BK Fig. 5", "BK 6.3")
 def test_the_numbers_of_paper_fig5_are_right():
-    w0, w1 = np.array([1, 2, 3]), np.array([2, 1, 1])
-    turn = np.pi / 6 * np.array([1, 4, 3])
+    turn, w0, w1 = PAPER["5"]
     solution = oracles.minimum_acceleration(turn, w0, w1)
     t = np.arange(106) / 105
     R = oracles.rotation_of_quaternions(solution.sol(t)[:4])
@@ -301,9 +297,8 @@ def test_the_tips_of_arms_agree_with_their_joint_angles():
 
 @pytest.mark.source("BK 1", "BK 7")
 def test_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
-    cell = (
-        100 + 4 * 10 + 5
-    )  # the first 100 cells are along the axis; this one is at 81° and 4.95 rad
+    # the first 100 cells are along the axis; this one is at 81° and 4.95 rad
+    cell = 100 + 4 * 10 + 5
     ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
     best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
     for name, place in (("median", 49), ("ninety", 89)):

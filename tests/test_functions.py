@@ -113,13 +113,10 @@ def test_errors_name_the_bad_argument(function):
         shapes = [()] * len(core[:1]) + [(2, 5, 7)] * len(core[1:])
         shapes += [(2, 7)] * (not {"n", "m"} & set(core) and len(core) > 0)
         bad = [np.zeros(shape) for shape in shapes]
-        bad += [[[1.0, 0, 0], [0, 1]], np.ma.masked_greater(given[name], 0), given[name] + 1j]
-        bad += [given[name].astype(str)]
+        good = given[name]
+        bad += [[[1.0, 0, 0], [0, 1]], np.ma.masked_greater(good, 0), good + 1j, good.astype(str)]
         if not function.__name__.startswith("is_"):
-            bad += [
-                np.where(given[name] == given[name].flat[0], x, given[name])
-                for x in (np.nan, np.inf)
-            ]
+            bad += [np.where(good == good.flat[0], x, good) for x in (np.nan, np.inf)]
         for one in bad:
             with pytest.raises(ValueError, match=rf"^{name}\b"):
                 function(**given | {name: one})
@@ -142,3 +139,8 @@ def test_parameters_and_results_are_documented(name):
 
 def test_most_exported_functions_are_tested_here():
     assert len(FUNCTIONS) >= 55
+
+
+def test_exported_arrays_are_read_only():
+    arrays = [rb.BASIS_SO3, rb.BASIS_SE3, rb.METRIC_SO3, rb.METRIC_SE3]
+    assert not any(array.flags.writeable for array in arrays)

@@ -136,17 +136,13 @@ def test_a_weight_exists_if_the_moments_satisfy_triangle_inequalities():
         assert_close(W / size, np.diag([2.5, 1.5, 0.5]), 8)
 
 
-def test_the_metrics_are_read_only():
+def test_arguments_that_do_not_fit_each_other_are_refused():
     one, crooked, many = np.eye(3), np.eye(3, k=1), np.ones((4, 1, 1)) * np.eye(3)
     inner, weight, unlike = "inner_left_invariant", "weight_from_inertia", "batch shapes do not"
     for name, arguments, message in (
         ("inner_gl", (np.eye(2), one), "X and Y: matrices of the same size are wanted"),
         ("inner_ga", ([[1]], [[1]]), "X: shape (..., n+1, n+1) is wanted"),
-        (
-            "tangent_from_components",
-            (np.eye(2), [1]),
-            "A: shape (..., 3, 3) or (..., 4, 4) is wanted",
-        ),
+        ("tangent_from_components", (np.eye(2), [1]), "A: shape (..., 3, 3) or (..., 4, 4) is"),
         ("tangent_from_components", (one, np.ones(6)), "x: shape (..., 3)"),
         ("tangent_from_components", (R[:2], w[:3]), f"{unlike} broadcast: A (2,), x (3,)"),
         ("components_from_tangent", (np.eye(4), one), "X: shape (..., 4, 4)"),
@@ -163,6 +159,3 @@ def test_the_metrics_are_read_only():
     ):
         with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
             getattr(metrics, name)(*arguments)
-    for metric in (rb.METRIC_SO3, rb.METRIC_SE3):
-        with pytest.raises(ValueError, match="read-only"):
-            metric[0, 0] = 1

@@ -25,13 +25,10 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
-from rbcourse.curves import Ends
-from rbcourse.optimum import guesses, search
+from rbcourse.optimum import search
 from rbcourse.optimum.chebyshev import grid, interpolation
 
-every_solver = pytest.mark.parametrize("what", SOLVERS)
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
-of_forces = pytest.mark.parametrize("what", ["acceleration", "torque"])
 TIMES = np.linspace(0, 1, 101)
 FEW = random_problems(2, 5, 2.0, 4.0)
 
@@ -103,7 +100,7 @@ def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
         assert np.all(np.abs(number - number[0]) < 1e-10 * np.abs(number).max(axis=0))
 
 
-@of_forces
+@pytest.mark.parametrize("what", ["acceleration", "torque"])
 @pytest.mark.parametrize("size", [2.0, 0.3, 1e-6, 1e9])
 def test_a_round_body_has_the_optimum_of_a_ball(what, size):
     """The optimum of an almost round body is near the optimum of a ball."""
@@ -257,15 +254,7 @@ def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkey
     assert np.abs(curves(TIMES) - good(TIMES))[:, 1:].max() < 1e-10
 
 
-@pytest.mark.parametrize("angle", [1.9, 2.5, 3.1, -1.9, -2.5, -3.1])
-def test_the_search_tries_both_directions_of_the_turn(angle):
-    ends = Ends(I3, rb.exp_so3([[0, 0, angle]]), REST, REST)
-    _, starts = guesses.starts(ends, 5)
-    halfway = np.linalg.norm(rb.log_so3(starts[:, 2]), axis=-1)
-    assert halfway == pytest.approx([abs(angle) / 2, np.pi - abs(angle) / 2], rel=1e-12)
-
-
-@every_solver
+@pytest.mark.parametrize("what", SOLVERS)
 def test_the_optimum_between_equal_rotations_at_rest_does_not_move(what):
     curve = SOLVERS[what](I3, I3, REST, REST, BOOK, REST, REST)
     name = {"torque": "MinimumTorque", "jerk": "MinimumJerk"}.get(what, "MinimumAcceleration")
@@ -300,13 +289,8 @@ def test_the_solver_improves_a_guess():
     assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
     motion = rb.geodesic_se3(np.eye(4), np.eye(4))
     for guess in (I3, motion, rb.chain([1, 2], [I3] * 2)):
-        with pytest.raises(
-            ValueError, match=r"^guess: a Curve on SO\(3\) that starts at t = 0 is wanted"
-        ):
+        with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) that starts at t = 0"):
             rb.stationary_so3(guess)
-
-
-ENDS = I3, I3, REST, REST
 
 
 @pytest.mark.parametrize(
@@ -325,4 +309,4 @@ ENDS = I3, I3, REST, REST
 )
 def test_bad_inertias_are_refused(make, G, message):
     with pytest.raises(ValueError, match=f"^inertia ?{re.escape(message)}"):
-        make(*ENDS, G)
+        make(I3, I3, REST, REST, G)

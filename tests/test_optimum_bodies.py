@@ -42,7 +42,6 @@ SELDOM_FOUND = {  # the least known costs of some fast problems in `best`
 TIMES = np.linspace(0, 1, 101)
 OF_SLOW_ENDS = rb.bezier_so3, rb.corrected_bezier_so3  # defined for ‖w‖ < 3π
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
-of_forces = pytest.mark.parametrize("what", ["acceleration", "torque"])
 
 
 def vectors(numbers):
@@ -187,7 +186,7 @@ def test_tiny_motions_cost_as_much_as_their_cubic(power):
 
 
 @pytest.mark.source("beyond BK 1", "beyond BK 4")
-@of_forces
+@pytest.mark.parametrize("what", ["acceleration", "torque"])
 def test_free_motions_cost_nothing(what):
     """SciPy integrates Euler's equations, for speeds up to 16. The optimum between the ends of this
     free motion is the same motion."""

@@ -60,18 +60,13 @@ def test_the_nearest_rotation_replaces_a_matrix_that_is_not_a_rotation():
 
 
 @pytest.mark.source("RR 3.2")
-def test_the_exponential_agrees_with_exp_se3():
-    """For small twists it also agrees with SciPy's expm to 5e-14. SciPy's error grows with the
-    twist."""
+def test_the_exponential_agrees_with_its_series_and_with_exp_se3():
     ours = planar.exp_planar(TWISTS)
     assert np.array_equal(ours[:, 2], TWISTS[:, 2])
-    in_space = np.insert(TWISTS[:, [2, 0, 1]], [0, 0, 3], 0, axis=1)
-    for twists, pose, exact, tolerance in (
-        (TWISTS, ours, [oracles.expm(hat(S)) for S in TWISTS], 8 * EPS),
-        (TWISTS / 8, planar.exp_planar(TWISTS / 8), [expm(hat(S / 8)) for S in TWISTS], 1e-14),
-        (TWISTS, ours, rb.exp_se3(in_space)[:, [0, 1, 3]][:, :, [0, 1, 3]], 1e-14),
-    ):
-        assert np.abs(planar.matrix_from_planar(pose) - exact).max() < tolerance, twists
+    A = planar.matrix_from_planar(ours)
+    assert np.abs(A - [oracles.expm(hat(S)) for S in TWISTS]).max() < 8 * EPS
+    in_space = rb.exp_se3(np.insert(TWISTS[:, [2, 0, 1]], [0, 0, 3], 0, axis=1))
+    assert np.abs(A - in_space[:, [0, 1, 3]][:, :, [0, 1, 3]]).max() < 1e-14
 
 
 def test_the_logarithm_undoes_the_exponential_except_for_full_turns():
@@ -133,14 +128,11 @@ def test_a_command_in_the_body_frame_is_a_constant_twist():
 
 @pytest.mark.source("RR 3.2")
 @both_frames
-def test_a_reversed_plan_leads_back_to_the_start(frame):
+def test_a_plan_moves_all_poses_of_a_stack(frame):
     plan = [(np.array(v, float), d) for v, d in PLAN]
     there = planar.propagate_planar(POSES.reshape(4, 50, 3), plan, frame=frame)
     one = planar.propagate_planar(POSES[57], PLAN, frame=frame)
     assert np.abs(there[:, 1, 7] - one).max() < 16 * EPS
-    undone = [(-velocity, duration) for velocity, duration in reversed(plan)]
-    back = planar.propagate_planar(there[-1], undone, frame=frame)
-    assert np.abs(back - there[::-1]).max() < 1e-14
     assert planar.propagate_planar([1, 2, 3], [], frame=frame).tolist() == [[1, 2, 3]]
     assert all(np.array_equal(v, given) for (v, _), (given, _) in zip(plan, PLAN, strict=True))
 

@@ -21,14 +21,7 @@ def test_theta_and_f_agree_with_the_corrected_formulas(name, order):
     if (name, order) == ("theta", 3):  # rounding errors are relative to the subtracted terms
         scale += 4 * line.theta(*grid, 2) ** 2 / line.theta(*grid, 1)
     assert np.all(off <= (2 * EPS if (name, order) == ("theta", 0) else 8 * EPS * scale + 1e-60))
-
-
-@pytest.mark.source("BK Cor. 2")
-def test_theta_is_the_inverse_of_f():
-    t, angle = GRID
-    error = np.abs(line.theta(line.f(t, angle), angle) - t)
-    assert np.all(error <= 4 * EPS * np.maximum(1, 2 * np.tan(angle / 2) / angle))
-    assert all(isinstance(one(0.5, 1.0), float) for one in (line.theta, line.f))
+    assert isinstance(getattr(line, name)(0.5, 1.0, order), float)
 
 
 @pytest.mark.source("BK (16)", "BK Cor. 1", "BK Cor. 2", "errata 8", "errata 9", "errata 10")

@@ -207,8 +207,7 @@ def test_paths_of_bodies_and_arms_are_drawn(states, pale):
 
 
 def test_the_animation_of_a_long_path_has_forty_frames(tmp_path):
-    """The path covers the plane. The animation of a hundred random rotations has a small file,
-    too."""
+    """The animation of a hundred random rotations has a small file, too."""
     t = np.linspace(0, 1, 10_000)
     path = np.transpose([1.3 * np.cos(716.9 * t), np.sin(245.86 * t), 50 * t])
     figure, animation = rr.visualize_path(path)
@@ -257,11 +256,7 @@ BAD = [
     (rr.random_rotation_matrix, (42,), "naive: True or False is wanted, got 42"),
     *((rr.visualize, (x,), "quaternion: True or False is wanted, got") for x in (0, None)),
     *((rr.visualize_rotation, (x,), "rotation: ") for x in (np.eye(2), NINE, [2, 0, 0, 0])),
-    (
-        rr.visualize_rotation,
-        (np.eye(3), {"steps": 0}),
-        "steps: an integer from 1 up is wanted, got 0",
-    ),
+    (rr.visualize_rotation, (np.eye(3), {"steps": 0}), "steps: an integer from 1 up is wanted"),
     (rr.interpolate_rigid_body, ([0, 0], [1, 1, 1]), r"start_pose: shape \(3\)"),
     (rr.interpolate_rigid_body, ([0, 0, 0], [[1, 1, 1]]), r"goal_pose: shape \(3\)"),
     (rr.forward_propagate_rigid_body, ([0, 0, np.nan], []), r"start_pose\[2\] is nan"),

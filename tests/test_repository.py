@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tomllib
 import warnings
-from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from importlib.util import find_spec
 from pathlib import Path
 from textwrap import dedent
 from types import SimpleNamespace
@@ -19,7 +19,9 @@ from zipfile import ZipFile
 import pytest
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name as canonical
 
+import course
 import rbclassroom
 import rbcourse
 from rbclassroom.course import lab, releases
@@ -29,18 +31,17 @@ PROJECT, CLASSROOM = (
     tomllib.loads((ROOT / place / "pyproject.toml").read_text("utf-8"))["project"]
     for place in ("", "classroom")
 )
-NAMES = ["environment.txt", *(f"classroom/environment-{name}.txt" for name in ("teach", "book"))]
-NAMES.append("tests/environment-test.txt")
-LISTS = {name: (ROOT / name).read_text("utf-8").splitlines() for name in NAMES}
-PINS = {
-    name: [Requirement(line.partition("#")[0]) for line in lines if line[0] not in "#-"]
-    for name, lines in LISTS.items()
-}
 EXTRAS = {  # each list has these extras of rbcourse and rbcourse-classroom
     "environment.txt": (["draw"], ["lessons"]),
     "classroom/environment-teach.txt": ([], ["grading"]),
     "classroom/environment-book.txt": ([], ["book"]),
     "tests/environment-test.txt": (["test", "lint"], ["browser"]),
+}
+NAMES = list(EXTRAS)
+LISTS = {name: (ROOT / name).read_text("utf-8").splitlines() for name in NAMES}
+PINS = {
+    name: [Requirement(line.partition("#")[0]) for line in lines if line[0] not in "#-"]
+    for name, lines in LISTS.items()
 }
 
 
@@ -51,10 +52,6 @@ def ranges_of(name):
         wanted += project["dependencies"] if name == "environment.txt" else []
         wanted += [line for extra in extras for line in project["optional-dependencies"][extra]]
     return [range_ for range_ in map(Requirement, wanted) if range_.name != "rbcourse"]
-
-
-def canonical(name):
-    return name.lower().replace("_", "-")
 
 
 def read(name):
@@ -144,14 +141,13 @@ def test_an_old_python_and_an_unknown_task_are_reported(
 
 
 def test_tasks_are_listed_if_none_is_given(monkeypatch, capsys):
-    module = course_module()
     monkeypatch.setattr(sys, "argv", ["course.py"])
-    module.main()
+    course.main()
     said = capsys.readouterr().out
-    for task in module.TASKS:
+    for task in course.TASKS:
         assert re.search(rf"^ +{task} +\w", said, re.MULTILINE), task
-    with pytest.raises(module.SetUpError, match=r"^no network\n$"):
-        module.patiently(sys.executable, "-c", "import sys; sys.exit('no network')")
+    with pytest.raises(course.SetUpError, match=r"^no network\n$"):
+        course.patiently(sys.executable, "-c", "import sys; sys.exit('no network')")
 
 
 def test_uv_does_not_make_an_environment_of_its_own():
@@ -161,50 +157,40 @@ def test_uv_does_not_make_an_environment_of_its_own():
     assert header == {"requires-python": PROJECT["requires-python"]}
 
 
-def course_module():
-    spec = spec_from_file_location("course", ROOT / "course.py")
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture
-def setting_up(tmp_path, monkeypatch):
-    """Return course.py in a new folder; its set-up records commands instead of running them."""
-    module, done = course_module(), []
+def done(tmp_path, monkeypatch):
+    """Give course.py a new folder, where it only records its commands; return their list."""
+    done = []
 
     def pretend(*command, **_):
         command = [str(word) for word in command]
         done.append(command)
         if "venv" in command:
-            assert module.read_stamp() == {"unfinished": True}
-            Path(module.python()).parent.mkdir(parents=True)
-            Path(module.python()).touch()
+            assert course.read_stamp() == {"unfinished": True}
+            Path(course.python()).parent.mkdir(parents=True)
+            Path(course.python()).touch()
 
-    for path in module.LISTS.values():
+    for path in course.LISTS.values():
         (tmp_path / path).parent.mkdir(exist_ok=True)
         (tmp_path / path).write_text("numpy")
-    monkeypatch.setattr(module, "ROOT", tmp_path)
-    monkeypatch.setattr(module, "VENV", tmp_path / ".venv")
-    monkeypatch.setattr(module, "UV", "uv")
-    monkeypatch.setattr(module, "patiently", pretend)
-    return module, done
+    monkeypatch.setattr(course, "ROOT", tmp_path)
+    monkeypatch.setattr(course, "VENV", tmp_path / ".venv")
+    monkeypatch.setattr(course, "UV", "uv")
+    monkeypatch.setattr(course, "patiently", pretend)
+    return done
 
 
 def installed(done):
     return [command[command.index("-r") + 1 :: 2] for command in done if "-r" in command]
 
 
-def test_a_list_is_installed_again_only_if_it_changes(
-    setting_up,
-):
-    module, done = setting_up
+def test_a_list_is_installed_again_only_if_it_changes(done):
     for environment in ("lessons", "lessons", "teach", "test", "test", "lessons"):
-        module.set_up(environment)
-    lessons, teach, book, test = module.LISTS.values()
+        course.set_up(environment)
+    lessons, teach, book, test = course.LISTS.values()
     assert installed(done) == [[lessons], [teach], [book, test]]
-    (module.ROOT / teach).write_text("scipy")
-    module.set_up("teach")
+    (course.ROOT / teach).write_text("scipy")
+    course.set_up("teach")
     assert teach in installed(done)[3]
     assert sum("venv" in command for command in done) == 1
 
@@ -212,87 +198,82 @@ def test_a_list_is_installed_again_only_if_it_changes(
 @pytest.mark.parametrize(
     "disturb",
     [
-        lambda module: (module.ROOT / "environment.txt").write_text("scipy"),
-        lambda module: Path(module.python()).unlink(),
-        lambda module: module.write_stamp({"unfinished": True}),
-        lambda module: (module.VENV / "made-by-course.txt").write_text("version 0.26"),
+        lambda: (course.ROOT / "environment.txt").write_text("scipy"),
+        lambda: Path(course.python()).unlink(),
+        lambda: course.write_stamp({"unfinished": True}),
+        lambda: (course.VENV / "made-by-course.txt").write_text("version 0.26"),
     ],
     ids=["the environment has changed", "its Python is gone", "it was interrupted", "it is old"],
 )
-def test_the_environment_is_made_again_if_needed(setting_up, disturb):
-    module, done = setting_up
-    module.set_up("lessons")
-    (module.VENV / "old").touch()
-    disturb(module)
-    module.set_up("lessons")
+def test_the_environment_is_made_again_if_needed(done, disturb):
+    course.set_up("lessons")
+    (course.VENV / "old").touch()
+    disturb()
+    course.set_up("lessons")
     assert sum("venv" in command for command in done) == 2
-    assert not (module.VENV / "old").exists()
+    assert not (course.VENV / "old").exists()
 
 
-def test_an_environment_of_another_tool_is_left_alone(setting_up):
-    module, done = setting_up
-    (module.VENV / "lib").mkdir(parents=True)
+def test_an_environment_of_another_tool_is_left_alone(done):
+    (course.VENV / "lib").mkdir(parents=True)
     message = r"\.venv was not made by course\.py.* 'rm -r \"/.*\.venv\"'"
     with pytest.raises(SystemExit, match=message):
-        module.set_up("lessons")
-    assert (module.VENV / "lib").exists()
+        course.set_up("lessons")
+    assert (course.VENV / "lib").exists()
     assert done == []
 
 
-def test_the_environment_in_use_is_not_made_again(setting_up, monkeypatch):
-    module, _ = setting_up
-    module.set_up("lessons")
-    Path(module.python()).unlink()
-    monkeypatch.setattr(sys, "prefix", str(module.VENV))
+def test_the_environment_in_use_is_not_made_again(done, monkeypatch):
+    course.set_up("lessons")
+    Path(course.python()).unlink()
+    monkeypatch.setattr(sys, "prefix", str(course.VENV))
     with pytest.raises(SystemExit, match="deactivate"):
-        module.set_up("lessons")
-    assert module.VENV.exists()
+        course.set_up("lessons")
+    assert course.VENV.exists()
 
 
-def test_pip_installs_the_packages_if_uv_fails(setting_up, monkeypatch):
-    module, done = setting_up
-    monkeypatch.setattr(module, "UV", None)
+def test_pip_installs_the_packages_if_uv_fails(done, monkeypatch):
+    monkeypatch.setattr(course, "UV", None)
     listed = "global.index-url='https://a/simple'\nglobal.extra-index-url='b\\nc'\n:env:.no='x'\n"
-    monkeypatch.setattr(module.subprocess, "run", lambda *_, **__: SimpleNamespace(stdout=listed))
-    assert module.settings_of_pip("pip") == {
+    monkeypatch.setattr(course.subprocess, "run", lambda *_, **__: SimpleNamespace(stdout=listed))
+    assert course.settings_of_pip("pip") == {
         "UV_INDEX_STRATEGY": "unsafe-best-match",
         "UV_DEFAULT_INDEX": "https://a/simple",
         "UV_INDEX": "b c",
     }
-    pretend = module.patiently
+    pretend = course.patiently
 
     def fails(*command, **settings):
         pretend(*command, **settings)
         if command[1] == "pip":
             assert settings["UV_INDEX"] == "b c"
-            raise module.SetUpError("no index")
+            raise course.SetUpError("no index")
 
-    monkeypatch.setattr(module, "patiently", fails)
-    module.set_up("lessons")
+    monkeypatch.setattr(course, "patiently", fails)
+    course.set_up("lessons")
     make, fetch, by_uv, by_pip, _ = done
     assert make[1:3] == ["-m", "venv"]
     assert fetch[-1] == "uv"
     assert Path(by_uv[0]).parts[-2:] == ("bin", "uv")
-    assert by_pip[:4] == [module.python(), "-m", "pip", "install"]
+    assert by_pip[:4] == [course.python(), "-m", "pip", "install"]
     assert by_uv[-2:] == by_pip[-2:] == ["-r", "environment.txt"]
 
 
-@pytest.mark.parametrize("task", course_module().TASKS)
-def test_each_task_passes_its_arguments_to_its_modules(task, setting_up, tmp_path, monkeypatch):
+@pytest.mark.parametrize("task", course.TASKS)
+def test_each_task_passes_its_arguments_to_its_modules(task, done, tmp_path, monkeypatch):
     """Relative paths start at the folder in which the command is typed."""
-    module, _ = setting_up
     ran = []
     (tmp_path / "ps1.ipynb").touch()
-    monkeypatch.setattr(module, "run", lambda *given: ran.append(given))
-    words = [] if (plain := task in module.PLAIN) else ["ps1.ipynb", "--due", "2026"]
+    monkeypatch.setattr(course, "run", lambda *given: ran.append(given))
+    words = [] if (plain := task in course.PLAIN) else ["ps1.ipynb", "--due", "2026"]
     monkeypatch.setattr(sys, "argv", ["course.py", task, *words])
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "")
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     monkeypatch.chdir(tmp_path)
-    module.main()
-    environment, commands, _ = module.TASKS[task]
-    assert [*module.read_stamp()][-1] == environment
-    if task in module.PATHS:
+    course.main()
+    environment, commands, _ = course.TASKS[task]
+    assert [*course.read_stamp()][-1] == environment
+    if task in course.PATHS:
         words[0] = str(tmp_path / "ps1.ipynb")
     assert ran[-1] == (*commands[-1].split(), *words)
     assert [words[0] for words in ran] == [command.split()[0] for command in commands]
@@ -302,7 +283,7 @@ def test_each_task_passes_its_arguments_to_its_modules(task, setting_up, tmp_pat
     if plain:
         monkeypatch.setattr(sys, "argv", ["course.py", task, "--help"])
         with pytest.raises(SystemExit, match="takes no options, got: --help"):
-            module.main()
+            course.main()
 
 
 @pytest.mark.parametrize("which", ["oldest", "newest"])
@@ -376,7 +357,7 @@ def test_every_task_is_listed_in_the_readme_or_in_contributing():
         re.findall(rows, read(name), re.MULTILINE) for name in ("README.md", "CONTRIBUTING.md")
     )
     assert {*users} == {"lab", "check", "book", "lecture", "handout", "collect", "grade"}
-    assert {*users, *maintainers} == set(course_module().TASKS)
+    assert {*users, *maintainers} == set(course.TASKS)
     assert len(read("README.md").splitlines()) <= 130
 
 
@@ -405,7 +386,7 @@ def distributions_for(requirements):
     left, asked = [(Requirement(line), {""}) for line in requirements], {}
     while left:
         requirement, extras = left.pop()
-        name, marker = requirement.name.lower().replace("_", "-"), requirement.marker
+        name, marker = canonical(requirement.name), requirement.marker
         if marker and not any(marker.evaluate({"extra": extra}) for extra in extras):
             continue
         wanted = {"", *requirement.extras}
@@ -469,14 +450,11 @@ def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_p
 
 
 def test_wheels_contain_types_and_styles(wheels):
-    for path, package, files in (
-        (wheels[0], "rbcourse", {"py.typed", "rbcourse.mplstyle", "paper.mplstyle"}),
-        (
-            wheels[1],
-            "rbclassroom",
-            {"lecture/static/deck.html", "lecture/static/vendor/LICENSES.txt"},
-        ),
-    ):
+    wanted = {
+        "rbcourse": {"py.typed", "rbcourse.mplstyle", "paper.mplstyle"},
+        "rbclassroom": {"lecture/static/deck.html", "lecture/static/vendor/LICENSES.txt"},
+    }
+    for path, (package, files) in zip(wheels, wanted.items(), strict=True):
         names = ZipFile(path).namelist()
         assert {f"{package}/{file}" for file in files} <= set(names)
         apart = "rbcourse/draw/", "rbclassroom/"
@@ -490,4 +468,4 @@ def test_tasks_and_options_in_documents_exist():
     text = "".join(map(read, ["README.md", "notebooks/assignments/README.md", teach]))
     code = "".join(path.read_text("utf-8") for path in ROOT.glob("classroom/rbclassroom/**/*.py"))
     assert all(f'"{x}"' in code for x in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
-    assert set(re.findall(r"course\.py ([a-z]+)", text)) <= set(course_module().TASKS)
+    assert set(re.findall(r"course\.py ([a-z]+)", text)) <= set(course.TASKS)

@@ -16,22 +16,15 @@ import rbclassroom
 import rbcourse
 
 ROOT = Path(rbcourse.__file__).parents[1]
-PACKAGES = {
-    name: Path(package.__file__).parent
-    for name, package in {"rbcourse": rbcourse, "rbclassroom": rbclassroom}.items()
-}
+PACKAGES = {one.__name__: Path(one.__file__).parent for one in (rbcourse, rbclassroom)}
 MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbcourse": set(),
     "rbcourse.draw": {"rbcourse"},
     "rbcourse.report": {"rbcourse", "rbcourse.draw"},
     "rbclassroom": set(),
     "rbclassroom.figures": {"rbcourse", "rbcourse.draw"},
-    "rbclassroom.explorers": {
-        "rbcourse",
-        "rbcourse.draw",
-        "rbclassroom.course",
-        "rbclassroom.figures",
-    },
+    "rbclassroom.explorers": {"rbcourse", "rbcourse.draw"}
+    | {"rbclassroom.course", "rbclassroom.figures"},
     "rbclassroom.surveys": {"rbcourse", "rbcourse.draw"},
     "rbclassroom.course": {"rbclassroom"},  # this part may not import `rbcourse`
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
@@ -40,10 +33,8 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbclassroom.book": {"rbclassroom.course", "rbclassroom.lecture", "rbclassroom.assignments"}
     | {"rbclassroom.live", "rbcourse.draw"},
 }
-PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))} | {
-    "report",
-    "textbook",
-}
+PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))}
+PUBLIC |= {"report", "textbook"}
 """Modules of the core whose names may be used from outside; each has an ``__all__``."""
 LIBRARIES = {
     "rbcourse": {"numpy", "scipy"},
@@ -134,8 +125,7 @@ def clients():
 
 
 def uses(text):
-    """Yield the module and the name of each object of `rbcourse` that a text imports or reads as an
-    attribute."""
+    """Yield the module and the name of each object of `rbcourse` that a text uses."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -195,11 +185,10 @@ def test_names_that_are_not_exported_are_reported(text, found):
     assert sorted(set(not_exported(text))) == found
 
 
-def test_exported_names_exist_and_are_documented():
-    for module in PUBLIC:
-        public = importlib.import_module(f"rbcourse.{module}")
-        assert len(set(public.__all__)) == len(public.__all__)
-        assert all(hasattr(public, name) for name in public.__all__), module
+def test_exported_names_exist_and_are_listed_once():
+    for module in (rbcourse, *(importlib.import_module(f"rbcourse.{name}") for name in PUBLIC)):
+        assert len(set(module.__all__)) == len(module.__all__)
+        assert all(hasattr(module, name) for name in module.__all__), module
 
 
 def test_importing_the_package_loads_only_numpy():
@@ -209,23 +198,16 @@ def test_importing_the_package_loads_only_numpy():
         import rbcourse
         print(*set(sys.modules) - before)
     """
-    done = subprocess.run(
-        [sys.executable, "-c", dedent(code)], capture_output=True, text=True, check=True
-    )
-    loaded = {name.split(".")[0] for name in done.stdout.split()}
-    assert loaded - set(sys.stdlib_module_names) - {"numpy"} == {"rbcourse"}
-    rooms = {name for name in done.stdout.split() if name.startswith("rbcourse.")}
-    assert {part(name) for name in rooms} == {"rbcourse"}
+    loaded = subprocess.check_output([sys.executable, "-c", dedent(code)], text=True).split()
+    others = {name.split(".")[0] for name in loaded} - set(sys.stdlib_module_names)
+    assert others - {"numpy"} == {"rbcourse"}
+    assert {part(name) for name in loaded if name.startswith("rbcourse.")} == {"rbcourse"}
 
 
-def test_every_public_name_is_listed_once_and_documented():
-    assert len(set(rbcourse.__all__)) == len(rbcourse.__all__)
-    for name in rbcourse.__all__:
-        assert getattr(rbcourse, name).__doc__, name
-
-
-def test_signatures_are_short_enough_to_be_read():
+def test_every_name_of_the_package_is_documented():
     """Shift + Tab shows the name ArrayLike, not its long definition."""
     for name in rbcourse.__all__:
-        if inspect.isroutine(getattr(rbcourse, name)) or inspect.isclass(getattr(rbcourse, name)):
-            assert "Buffer" not in str(inspect.signature(getattr(rbcourse, name))), name
+        exported = getattr(rbcourse, name)
+        assert exported.__doc__, name
+        if inspect.isroutine(exported) or inspect.isclass(exported):
+            assert "Buffer" not in str(inspect.signature(exported)), name

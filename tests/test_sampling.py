@@ -44,8 +44,7 @@ def test_draws_of_any_shape_are_rotations(sampler):
 @pytest.mark.source("RR 2.1", "RR (9)", "RR (10)", "RR (11)", "RR 2.2", "RR (13)")
 @pytest.mark.parametrize("name", ["sample_rotation", "sample_quaternion"])
 def test_fast_draws_equal_the_draws_of_the_textbook(name):
-    """The draws fill one block or several. The generator ends in the same state as the
-    textbook's."""
+    """The generator ends in the same state as the textbook's, after one block or several."""
 
     class Given(np.random.Generator):
         def random(self, size):
@@ -112,10 +111,9 @@ def test_other_processors_give_the_same_samples_up_to_rounding():
     """In this test, NumPy does not use the instructions that make its tangent fast."""
     code = "import rbcourse as rb; print(*map(float, rb.sample_rotation(300, rng=8).ravel()))"
     slow = os.environ | {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"}
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, env=slow
-    )
-    drawn = np.array(done.stdout.split(), dtype=float).reshape(300, 3, 3)
+    words = [sys.executable, "-W", "ignore", "-c", code]
+    printed = subprocess.check_output(words, text=True, env=slow)
+    drawn = np.array(printed.split(), dtype=float).reshape(300, 3, 3)
     assert np.abs(drawn - rb.sample_rotation(300, rng=8)).max() < 8 * EPS
 
 

@@ -2,6 +2,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from optima import ALONG, PAPER
 from scipy import integrate
 from scipy.spatial.transform import Rotation
 
@@ -10,9 +11,6 @@ from rbcourse import textbook
 
 EPS = np.finfo(float).eps
 TIMES = np.linspace(0, 1, 101)
-ALONG = np.pi / 6 * np.array([1, 2, 3])
-FIGURE_4C = ALONG, ALONG, ALONG + np.array([5.0, 0, 0])
-FIGURE_5 = np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])
 
 
 @pytest.mark.source("BK 6.1")
@@ -36,7 +34,7 @@ def test_the_projected_cubic_agrees_with_the_textbook():
             assert np.abs(curve(TIMES, order) - want).max() < 4 * EPS * size ** (1 + order)
 
 
-@pytest.mark.parametrize(("turn", "w0", "w1"), [FIGURE_4C, FIGURE_5])
+@pytest.mark.parametrize(("turn", "w0", "w1"), [PAPER["4c"], PAPER["5"]])
 @pytest.mark.source("BK (19)", "beyond BK 4")
 def test_the_optima_agree_with_the_textbook(turn, w0, w1):
     R0, body = Rotation.random(rng=19).as_matrix(), np.diag([1, 2.2, 2.9])
