@@ -20,16 +20,11 @@ def as_array(
 ) -> Array:
     """Return `value` as an array of floats; its last axes must have the sizes `core`.
 
-    A letter in `core` matches any size ≥ 1, repeated letters match the same size, and "n+1" matches
-    any size ≥ 2. For example, ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All
-    other axes are batch axes; with ``stacked=False``, no batch axis is allowed. Entries may be NaN
-    or infinite. With ``copy=False``, the result may be the input.
-
-    Raises
-    ------
-    ValueError
-        If `value` is ragged, is masked, has another shape, or has entries that are not real
-        numbers. The message names the argument, and the expected and the given shape or type.
+    Ragged and masked arrays, and entries that are not real numbers, are refused. A letter in `core`
+    matches any size ≥ 1, repeated letters match the same size, and "n+1" matches any size ≥ 2. For
+    example, ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes are
+    batch axes; with ``stacked=False``, no batch axis is allowed. Entries may be NaN or infinite.
+    With ``copy=False``, the result may be the input.
     """
     given: Any
     parts: Any = value if isinstance(value, list | tuple) else [value]
@@ -56,7 +51,7 @@ def as_array(
 def as_finite(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
     """Return `value` as `as_array` does, but refuse NaN and infinity."""
     array = as_array(name, value, *core, stacked=stacked)
-    _check_all(np.isfinite(array), name, array, "a finite number")
+    check_all(np.isfinite(array), name, array, "a finite number")
     return array
 
 
@@ -90,11 +85,7 @@ def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
 def as_inertia(name: str, value: ArrayLike) -> Array:
     """Return 3 × 3 matrices; they must be symmetric and positive definite.
 
-    Raises
-    ------
-    ValueError
-        If a matrix is not symmetric or not positive definite, or if the squares of its eigenvalues
-        overflow or underflow. The message names the first such matrix.
+    The squares of their eigenvalues must neither overflow nor underflow.
     """
     G = as_symmetric(name, value, 3)
     moments = np.linalg.eigvalsh(G)
@@ -118,7 +109,7 @@ def as_inertia(name: str, value: ArrayLike) -> Array:
 def as_within_unit(name: str, value: ArrayLike, *core: int | str) -> Array:
     """Return `value` as `as_finite` does; all entries must lie in [0, 1]."""
     array = as_finite(name, value, *core)
-    _check_all((array >= 0) & (array <= 1), name, array, "a number in [0, 1]")
+    check_all((array >= 0) & (array <= 1), name, array, "a number in [0, 1]")
     return array
 
 
@@ -137,7 +128,7 @@ def as_time(
         slack = 8 * EPS * np.maximum(abs(start), np.abs(ends))
         outside = (times < start - slack) | (times > ends + slack)
         wanted = f"a time in [{start:.17g}, {ends[outside][0] if outside.any() else 1:.17g}]"
-        _check_all(~outside, "t", times, wanted)
+        check_all(~outside, "t", times, wanted)
         times = np.clip(times, start, ends)
     return times.reshape(times.shape + (1,) * batch_ndim)
 
@@ -145,7 +136,7 @@ def as_time(
 def as_duration(name: str, value: ArrayLike) -> Array:
     """Return durations of at least 1e-100; shorter ones would make accelerations overflow."""
     durations = as_finite(name, value)
-    _check_all(durations >= 1e-100, name, durations, "a duration from 1e-100 up")
+    check_all(durations >= 1e-100, name, durations, "a duration from 1e-100 up")
     return durations
 
 
@@ -153,7 +144,7 @@ def as_angle(angle: ArrayLike) -> Array:
     """Return angles of rotation in [0, π]; an angle that exceeds π only by rounding becomes π."""
     angles = as_finite("angle", angle)
     within = (angles >= 0) & (angles <= np.pi * (1 + 4 * EPS))
-    _check_all(within, "angle", angles, "an angle in [0, π]")
+    check_all(within, "angle", angles, "an angle in [0, π]")
     return np.minimum(angles, np.pi)
 
 
@@ -169,10 +160,9 @@ def as_positive(name: str, value: float) -> float:
     """Return a number above 0."""
     if isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} is {value}, a number above 0 is wanted")
-    number = float(as_single(name, value))
-    if number <= 0:
-        raise ValueError(f"{name} is {number}, a number above 0 is wanted")
-    return number
+    number = as_single(name, value)
+    check_all(number > 0, name, number, "a number above 0")
+    return float(number)
 
 
 def as_count(name: str, value: int) -> int:
@@ -217,10 +207,7 @@ def check_order(order: int, most: int) -> int:
 def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
     """Return the common batch shape of arrays; each is given with its number of core axes.
 
-    Raises
-    ------
-    ValueError
-        If the batch shapes do not broadcast; the message lists all of them.
+    If the batch shapes do not broadcast, the ValueError lists all of them.
     """
     batches = {name: array.shape[: array.ndim - core] for name, (array, core) in arguments.items()}
     try:
@@ -236,7 +223,8 @@ def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
     return f"{name}[{first}]" if first else name
 
 
-def _check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -> None:
+def check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -> None:
+    """Raise a ValueError that names the first entry that does not pass, and what is wanted."""
     if not passes.all():
         value = array[~passes][0]
         raise ValueError(f"{first_index(name, ~passes)} is {value}, {wanted} is wanted")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, as_single, first_index
+from rbcourse._checks import as_finite, as_single, check_all, first_index
 from rbcourse._numerics import EPS, Array
 from rbcourse.planar import Plan, interpolate, propagate
 
@@ -203,7 +203,5 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
 
 def _lengths(lengths: ArrayLike, n: int) -> Array:
     checked = as_single("lengths", lengths, n)
-    if not (checked > 0).all():
-        i = int(np.argmin(checked))
-        raise ValueError(f"lengths[{i}] is {checked[i]}, a length above 0 is wanted")
+    check_all(checked > 0, "lengths", checked, "a length above 0")
     return checked

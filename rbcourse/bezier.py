@@ -276,11 +276,9 @@ class Bezier(QuaternionCurve):
 
 
 def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
-    point = np.broadcast_to(np.eye(4)[0], (*T.shape, 4))
-    points = [point]
+    points = [np.broadcast_to(np.eye(4)[0], (*T.shape, 4))]
     for leg in legs:
-        point = quaternion_multiply(point, quaternion_from_rotation_vector(leg))
-        points.append(point)
+        points.append(quaternion_multiply(points[-1], quaternion_from_rotation_vector(leg)))
     return Bezier(
         duration=T, start=quaternion_from_matrix(ends.R0), controls=np.stack(points, axis=-2)
     )

@@ -9,7 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, as_positive, as_symmetric, check_broadcast, first_index
+from rbcourse._checks import (
+    as_finite,
+    as_positive,
+    as_symmetric,
+    check_all,
+    check_broadcast,
+    first_index,
+)
 from rbcourse._numerics import EPS, Array, matvec, scaled
 from rbcourse.se3 import hat_se3
 from rbcourse.so3 import hat_so3, vee
@@ -182,10 +189,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     >>> float(S @ semi_riemannian_metric_se3(2, 1) @ S)
     0.0
     """
-    for name, value in (("alpha", alpha), ("beta", beta)):
-        number = as_finite(name, value)
-        if number.ndim or not number > 0:
-            raise ValueError(f"{name}: a positive number is wanted, got {value!r}")
+    alpha, beta = as_positive("alpha", alpha), as_positive("beta", beta)
     return np.kron([[alpha, beta], [beta, 0.0]], np.eye(3))
 
 
@@ -266,10 +270,7 @@ def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
            [ 0.,  0.,  5.]])
     """
     sides, mass = as_finite("sides", sides, 3), as_positive("mass", mass)
-    negative = np.asarray(sides < 0).any(axis=-1)
-    if np.any(negative):
-        where = first_index("sides", np.asarray(negative))
-        raise ValueError(f"{where}: lengths from 0 up are wanted, got {sides.min():.6g}")
+    check_all(sides >= 0, "sides", sides, "a length from 0 up")
     squares = sides**2
     moments = squares[..., [1, 2, 0]] + squares[..., [2, 0, 1]]
     return mass / 12 * moments[..., None] * np.eye(3)

@@ -46,6 +46,8 @@ class RigidMotion(Curve):
     path: Array
     centre: Array
 
+    size = 4
+
     def values(self, t: Array, order: int) -> Array:
         """Return the pose, or (w, Rᵀ d'), or (w', Rᵀ d''), where d is the origin's position."""
         by_curve = len(t) > self.count  # put the longer axis last
@@ -77,11 +79,6 @@ class RigidMotion(Curve):
     def _terms(self) -> Array:
         """The terms of the path, shape (n + 1, 3, count)."""
         return stack_terms(self.path)
-
-    @property
-    def size(self) -> int:
-        """The size of the matrices, 4."""
-        return 4
 
     @property
     def breakpoints(self) -> Array:
@@ -308,10 +305,7 @@ class ScrewMotion(Curve):
     A0: Array
     displacement: Array
 
-    @property
-    def size(self) -> int:
-        """The size of the matrices, 4."""
-        return 4
+    size = 4
 
     @property
     def twist(self) -> Array:
@@ -403,12 +397,7 @@ class Screw(NamedTuple):
 
 
 def _cubic_ends(
-    A0: ArrayLike,
-    A1: ArrayLike,
-    w0: ArrayLike,
-    w1: ArrayLike,
-    d0_dot: ArrayLike,
-    d1_dot: ArrayLike,
+    A0: ArrayLike, A1: ArrayLike, w0: ArrayLike, w1: ArrayLike, d0_dot: ArrayLike, d1_dot: ArrayLike
 ) -> tuple[Ends, tuple[Array, ...]]:
     poses = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
     w = as_finite("w0", w0, 3), as_finite("w1", w1, 3)

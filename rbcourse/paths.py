@@ -388,15 +388,11 @@ def _arguments(leg: Leg) -> list[str]:
         parameters = signature(leg).parameters
     except (TypeError, ValueError) as error:
         raise ValueError(f"leg: a function that makes curves is wanted, got {leg!r}") from error
-    taken = {one.kind for one in parameters.values()}
-    if "duration" not in parameters and Parameter.VAR_KEYWORD not in taken:
+    named = [one for one in parameters.values() if one.kind != Parameter.VAR_KEYWORD]
+    if "duration" not in parameters and len(named) == len(parameters):
         raise ValueError(f"leg: it has no parameter duration: {leg!r}")
-    needed = [one.name for one in parameters.values() if one.default is Parameter.empty]
-    return [
-        name
-        for name in needed
-        if name != "duration" and parameters[name].kind != Parameter.VAR_KEYWORD
-    ]
+    needed = [one.name for one in named if one.default is Parameter.empty]
+    return [name for name in needed if name != "duration"]
 
 
 def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:

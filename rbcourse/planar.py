@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_count, as_finite, as_single, check_broadcast
+from rbcourse._checks import as_count, as_finite, as_single, check_all, check_broadcast
 from rbcourse._numerics import Array, scaled, sinc
 
 __all__ = [
@@ -306,10 +306,9 @@ def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> 
         velocity, duration = command
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: (velocity, duration) is wanted, got {command!r}") from error
-    d = float(as_single(f"{name} duration", duration))
-    if d < 0:
-        raise ValueError(f"{name} duration is {d}, a duration from 0 up is wanted")
-    return as_single(f"{name} velocity", velocity, size), d
+    d = as_single(f"{name} duration", duration)
+    check_all(d >= 0, f"{name} duration", d, "a duration from 0 up")
+    return as_single(f"{name} velocity", velocity, size), float(d)
 
 
 def as_states(path: ArrayLike) -> Array:

@@ -1,13 +1,14 @@
 """Newton's method for R p = c; the unknowns are the values of a curve at Chebyshev nodes.
 
 `Stationary` is the equation for any functional. `BallStationary` is the equation R w'' = c for a
-ball; it has fewer unknowns and faster steps.
+ball; it has fewer unknowns and faster steps. Both contain a stack of problems and have the same
+methods.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol, Self, TypeAlias
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ ROUGH = 1e-2  # rad: after a step shorter than this, the method continues on mor
 NODES = 17, 25, 33, 49, 65, 97, 129
 FAILED, FINER, SOLVED = range(3)
 Arrays: TypeAlias = tuple[Array, ...]
+Equations: TypeAlias = "Stationary | BallStationary"
 
 
 class Solution(NamedTuple):
@@ -53,49 +55,6 @@ class Failure(NamedTuple):
     def cost(self) -> float:
         """The cost, which is infinite."""
         return np.inf
-
-
-class Equations(Protocol):
-    """The equations R' = R ŵ and R p = c of a stack of problems.
-
-    The unknowns are R at n nodes, c and, for `Stationary`, k.
-    """
-
-    R0: Array
-    R1: Array
-    ends: Array  # w0, w1 (and a0, a1), shape (N, m, 3)
-    together: int  # number of problems that are solved together, so that they fit into the cache
-
-    def take(self, index: Any) -> Self:
-        """Return the equations of some of the problems."""
-
-    def first(self, R: Array) -> Arrays:
-        """Return initial values of the other unknowns, from rotations of shape (N, n, 3, 3)."""
-
-    def nodes(self, n: int) -> tuple[int, ...]:
-        """Return the increasing numbers of nodes on which to work; the first number is n."""
-
-    def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
-        """Return the largest error of each problem, and the data for a step."""
-
-    def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
-        """Return the turns of R, in the fixed frame, and the changes of the other unknowns.
-
-        On the last axis, the first column is a Newton step. If `by_ends`, the other columns are the
-        responses to a unit change of each end value.
-        """
-
-    def bend(self, unknowns: Arrays) -> Array:
-        """Return k at the nodes."""
-
-    def bend_by(self, unknowns: Arrays, responses: Arrays) -> Array:
-        """Return the changes of k that belong to the `responses`."""
-
-    def tails(self, unknowns: Arrays) -> Array:
-        """Return the last Chebyshev coefficients, which estimate the truncation error."""
-
-    def solution(self, unknowns: Arrays) -> tuple[Array, Array, Array]:
-        """Return k, c and the cost."""
 
 
 def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
@@ -273,7 +232,7 @@ class Stationary:
     Source: beyond BK 2.
     """
 
-    together = 24
+    together = 24  # number of problems that are solved together, so that they fit into the cache
 
     def __init__(self, functional: Functional, R0: Array, R1: Array, ends: Array) -> None:
         self.functional, self.R0, self.R1, self.ends = functional, R0, R1, ends
@@ -284,7 +243,7 @@ class Stationary:
         return type(self)(self.functional.take(index), *parts)
 
     def first(self, R: Array) -> tuple[Array, Array]:
-        """Return k, fitted to w by n/2 polynomials, and c = 0.
+        """Return initial values, given R: k, fitted to w by n/2 polynomials, and c = 0.
 
         The mean of R p would be a worse initial value of c.
         """
@@ -293,7 +252,7 @@ class Stationary:
         return by.fit @ (w - by.from_ends[0] @ self.ends), np.zeros((len(R), 3))
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return n and those of `NODES` that are larger."""
+        """Return the numbers of nodes on which to work: n and those of `NODES` that are larger."""
         return n, *(more for more in NODES if more > n)
 
     def errors(self, unknowns: Arrays) -> tuple[Array, Arrays]:
@@ -312,7 +271,10 @@ class Stationary:
         return np.maximum(*left), (E, W, lacking, *rates)
 
     def responses(self, unknowns: Arrays, parts: Arrays, by_ends: bool = False) -> Arrays:
-        """Return the turns ε of the nodes, and the changes of k and c.
+        """Return the turns ε of the nodes, in the fixed frame, and the changes of k and c.
+
+        On the last axis, the first column is a Newton step. If `by_ends`, the other columns are the
+        responses to a unit change of each end value.
 
         Let Kᵢ be the integrals that give the rates w, w', … from k, and let Pᵢ be the derivatives
         of p with respect to these rates. Then
@@ -351,11 +313,11 @@ class Stationary:
         return turn, x[:, : 3 * n].reshape(count, n, 3, columns), x[:, 3 * n :]
 
     def bend(self, unknowns: Arrays) -> Array:
-        """Return k."""
+        """Return k at the nodes."""
         return unknowns[1]
 
     def bend_by(self, unknowns: Arrays, responses: Arrays) -> Array:
-        """Return the changes of k."""
+        """Return the changes of k that belong to the `responses`."""
         return responses[1]
 
     def tails(self, unknowns: Arrays) -> Array:

@@ -18,67 +18,35 @@ cost.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol, Self
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
 from rbcourse._numerics import Array, cross, matvec
 from rbcourse.so3 import hat
 
+Functional: TypeAlias = "BallAcceleration | Effort | Jerk"
+"""A number times ∫ ‖u‖² dt for a stack of problems.
 
-class Functional(Protocol):
-    """A number times ∫ ‖u‖² dt for a stack of problems; it also gives the derivatives of u and p.
+The rates w, w', … have the shape (N, n, 3), for N problems and n times. The method `deviation`
+returns u, and `p` returns p. `deviation_by` and `p_by` return their derivatives with respect to the
+rates, as lists of 3 × 3 matrices, shape (N, n, 3, 3); the first one is the derivative with respect
+to w. `momenta` returns the momenta, shape (N, n, 3) or, for the jerk, (N, n, 6), and their
+derivatives. If the end values of an optimum change by δ, ∫ ‖u‖² dt changes by momenta · δ at t = 1,
+minus momenta · δ at t = 0.
 
-    The rates w, w', … have the shape (N, n, 3), for N problems and n times. Derivatives with
-    respect to the rates are lists of 3 × 3 matrices, shape (N, n, 3, 3); the first one is the
-    derivative with respect to w.
-
-    Attributes
-    ----------
-    name : str
-        The name of the optimum.
-    ends : int
-        The number of end values of an optimum: 2 (w at 0 and 1) or 4 (also w'). It is also the
-        order of the highest derivative of w in p.
-    needs : tuple of int
-        The orders of the derivatives ``c(t, order)`` on which the deviation u depends.
-    scale, unit : float or ndarray, shape (N,)
-        The cost is `scale` times ∫ ‖u‖² dt, and the costate is `unit` times `p`.
-    """
-
-    name: str
-    ends: int
-    needs: tuple[int, ...]
-    scale: Any
-    unit: Any
-
-    def take(self, index: Any) -> Self:
-        """Return the functional of some of the problems."""
-
-    @property
-    def deviation(self) -> Callable[..., Array]:
-        """The function of w, w', … that returns u."""
-
-    @property
-    def deviation_by(self) -> Callable[..., list[Array]]:
-        """The function of w, w', … that returns the derivatives of u."""
-
-    @property
-    def momenta(self) -> Callable[..., tuple[Array, list[Array]]]:
-        """The function of w, w', … that returns the momenta, and their derivatives.
-
-        The momenta have the shape (N, n, 3), or for the jerk (N, n, 6). If the end values of an
-        optimum change by δ, ∫ ‖u‖² dt changes by momenta · δ at t = 1, minus momenta · δ at t = 0.
-        """
-
-    @property
-    def p(self) -> Callable[..., Array]:
-        """The function of w, w', … that returns p."""
-
-    @property
-    def p_by(self) -> Callable[..., list[Array]]:
-        """The function of w, w', … that returns the derivatives of p."""
+Attributes
+----------
+name : str
+    The name of the optimum.
+ends : int
+    The number of end values of an optimum: 2 (w at 0 and 1) or 4 (also w'). It is also the order of
+    the highest derivative of w in p.
+needs : tuple of int
+    The orders of the derivatives ``c(t, order)`` on which the deviation u depends.
+scale, unit : float or ndarray, shape (N,)
+    The cost is `scale` times ∫ ‖u‖² dt, and the costate is `unit` times `p`.
+"""
 
 
 class BallAcceleration:

@@ -109,9 +109,8 @@ def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
         k3 = rate(w + h / 2 * k2)
         k4 = rate(w + h * k3)
         w = w + h / 6 * (k1 + 2 * (k2 + k3) + k4)
-        path.append(
-            w * (size / np.maximum(np.linalg.norm(moments * w, axis=-1), 1e-150))[..., None]
-        )
+        now = np.linalg.norm(moments * w, axis=-1)
+        path.append(w * (size / np.maximum(now, 1e-150))[..., None])
     w = np.stack(path)
     a, h = rate(w), np.diff(t).reshape(-1, *(1 for _ in w0.shape))
     turn = h / 2 * (w[1:] + w[:-1]) + h**2 / 12 * (a[:-1] - a[1:] + np.cross(w[:-1], w[1:]))

@@ -17,6 +17,7 @@ from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.collocation import (
     BallStationary,
+    Equations,
     Failure,
     Solution,
     Stationary,
@@ -88,7 +89,7 @@ class Task(NamedTuple):
 
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
-    equations: BallStationary | Stationary
+    equations: Equations
     # a call with problem indices and n returns the problem of each start, and the starts at n nodes
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
@@ -235,11 +236,8 @@ def _with_more_turns(
     if not (least > LIMITS.worth_a_turn * full_turn)[problem].any():
         return problem, R, cost
     some = ~(cost > LIMITS.turned * least[problem]) & ~_repeated(problem, cost, R)
-    problem, R = (
-        problem[some],
-        with_ends(on_nodes(R[some], LIMITS.nodes_for_turns), ends[problem[some]]),
-    )
-    R, cost = lowered(effort.take(problem), R, *LIMITS.on_more_nodes)
+    problem, R = problem[some], on_nodes(R[some], LIMITS.nodes_for_turns)
+    R, cost = lowered(effort.take(problem), with_ends(R, ends[problem]), *LIMITS.on_more_nodes)
     turned = 0
     for apart in LIMITS.turned, LIMITS.turned_again:
         least = _least(count, problem, cost)
@@ -252,9 +250,8 @@ def _with_more_turns(
         number = np.tile(problem[some], 6)
         more = with_full_turns(R[some], ends[problem[some]], effort.G[problem[some]])
         more, briefly = lowered(effort.take(number), more, *LIMITS.new_turns)
-        some = ~(briefly > LIMITS.promising_turn * least[number]) & ~_repeated(
-            number, briefly, more
-        )
+        some = ~(briefly > LIMITS.promising_turn * least[number])
+        some &= ~_repeated(number, briefly, more)
         number = number[some]
         more, cost_of_more = lowered(effort.take(number), more[some], *LIMITS.on_more_nodes)
         problem, R = np.append(problem, number), np.concatenate([R, more])

@@ -36,6 +36,7 @@ from rbcourse.optimum.collocation import (
     NODES,
     Arrays,
     BallStationary,
+    Equations,
     Failure,
     Solution,
     Stationary,
@@ -375,7 +376,7 @@ class _Problem(NamedTuple):
             values[[0, -1]] = (values[0] + values[-1]) / 2
         return np.where(self.ends.fixed[:, None], self.ends.given, values)
 
-    def equations(self, values: Array, n: int) -> BallStationary | Stationary:
+    def equations(self, values: Array, n: int) -> Equations:
         """Return the equations R p = c of the legs, for n nodes and values at the poses."""
         parts = self.R[:-1], self.R[1:], self.own(values)
         if isinstance(self.functional, BallAcceleration):
@@ -526,7 +527,7 @@ def _newton(problem: _Problem, R: Array) -> _Found | Failure:
 
 
 def _linearised(
-    problem: _Problem, legs: BallStationary | Stationary, unknowns: Arrays, parts: Arrays
+    problem: _Problem, legs: Equations, unknowns: Arrays, parts: Arrays
 ) -> tuple[KnotSystem, Arrays]:
     """Return the linear system of a Newton step, and the responses of the legs' unknowns."""
     m, count = problem.functional.ends, len(problem.h)
