@@ -8,9 +8,11 @@ import numpy as np
 from benchmarks import contests, figure, report, timing
 
 
-def run(chosen, rng, **options):
-    """Run contests; print and return their rows. `options` are passed to `timing.in_turn`."""
-    machine, rows = timing.describe_machine(), []
+def main(chosen=contests.CONTESTS, folder=Path(__file__).parent, **options):
+    """Run contests, print the results, and write them; `options` are those of `timing.in_turn`."""
+    if not contests.roma:
+        print("roma is not installed; the run continues without it.")
+    machine, rng, rows = timing.describe_machine(), np.random.default_rng(), []
     print(f"{machine}\nThe times of a call and their ratios are medians over rounds.")
     for contest in chosen:
         for n in contest.sizes:
@@ -18,18 +20,12 @@ def run(chosen, rng, **options):
             for row in timing.compete(contest, n, rng, machine, **options):
                 print(report.line(row, contest.bound), flush=True)
                 rows.append(row)
-    return rows
-
-
-def main(chosen=contests.CONTESTS, folder=Path(__file__).parent, readme=report.README, **options):
-    """Run the contests of all installed packages, and write the results."""
-    if not contests.roma:
-        print("roma is not installed; the run continues without it.")
-    rows = run(chosen, np.random.default_rng(), **options)
     report.write_csv(rows, folder / "benchmarks.csv")
     written = report.read_csv(folder / "benchmarks.csv")
-    report.update_readme(written, readme)
-    figure.save(figure.draw(written), folder / "benchmarks")
+    report.update_readme(written, folder / "README.md")
+    fig = figure.draw(written)
+    for ending, varying in ((".png", "Software"), (".pdf", "CreationDate")):
+        fig.savefig(folder / f"benchmarks{ending}", metadata={varying: None})  # the same bytes
 
 
 if __name__ == "__main__":

@@ -32,8 +32,7 @@ except ImportError:
     roma = torch = None
 try:
     import toppra
-    import toppra.algorithm
-    import toppra.constraint
+    from toppra import algorithm, constraint
 
     toppra.setup_logging("ERROR")
 except ImportError:
@@ -83,8 +82,8 @@ def nearest_rotation(n, rng):
 
 def geodesic(n, rng):
     """Compare evaluations of a geodesic at n times; making the curve is not timed."""
-    R0, t = rb.sample_rotation(rng=rng), rng.random(n)
-    R1 = R0 @ rb.exp_so3([1, -1, 1.5])
+    R0, t, sigma = rb.sample_rotation(rng=rng), rng.random(n), np.array([1, -1, 1.5])
+    R1 = R0 @ rb.exp_so3(sigma)
     ours, ends = rb.geodesic_so3(R0, R1), Rotation.from_matrix([R0, R1])
     theirs, xyzw = Slerp([0, 1], ends), ends.as_quat()
     methods = {
@@ -102,7 +101,6 @@ def geodesic(n, rng):
     convert, does = matrices_from_quaternions, "quaternion_slerp_batch"
     methods["pytransform3d"] = Method(f"{does}, {convert.__name__}", lambda: convert(batch()))
     methods["pytransform3d, as quaternions"] = Method(does, batch, convert)
-    sigma = oracles.log_so3(R0.T @ R1)
     return methods, _distance([R0 @ oracles.exp_so3(x * sigma) for x in t[:SAMPLE]])
 
 
@@ -146,10 +144,7 @@ def closed_forms(n, rng, orders):
 
 
 def random_samples(n, rng, kind, author, form, name):
-    """Compare samplers of n matrices or unit quaternions.
-
-    The error is the largest deviation of a singular value from 1.
-    """
+    """Compare samplers of n matrices or unit quaternions, whose singular values should be 1."""
     ours, theirs = getattr(rb, f"sample_{kind}"), getattr(textbook, f"sample_{kind}")
     convert = getattr(Rotation, f"as_{form}")
     methods = {
@@ -163,8 +158,7 @@ def random_samples(n, rng, kind, author, form, name):
         methods["RoMa"] = Method(f"{name}, float64", sample)
 
     shape = (-1, 3, 3) if form == "matrix" else (-1, 4, 1)
-    stretches = partial(np.linalg.svd, compute_uv=False)
-    return methods, lambda x: np.abs(stretches(x[:SAMPLE].reshape(shape)) - 1).max()
+    return methods, lambda x: np.abs(np.linalg.svdvals(x[:SAMPLE].reshape(shape)) - 1).max()
 
 
 def chain_of_poses(n, rng, legs, poses=1000):
@@ -194,7 +188,7 @@ def splines(n, rng):
     axes, t = rng.normal(size=(n, 3)), np.cumsum(rng.uniform(0.5, 1.5, n + 1))
     turns = rb.exp_so3(np.pi / 6 * axes / np.linalg.norm(axes, axis=1)[:, None])
     R = np.array(list(accumulate(turns, np.matmul, initial=np.eye(3))))
-    rotations, best = Rotation.from_matrix(R), rb.minimum_acceleration_spline_so3
+    known, best = Rotation.from_matrix(R), rb.minimum_acceleration_spline_so3
 
     def closed(make):
         more = rb.acceleration_cost(make(t, R)) / best(t, R).cost - 1
@@ -205,9 +199,7 @@ def splines(n, rng):
         "rbcourse, quaternions": closed(rb.quaternion_spline_so3),
         "rbcourse, projected cubics": closed(rb.projected_spline_so3),
         "rbcourse, their velocities": Method("", partial(rb.spline_velocities, t, R), None),
-        "SciPy, another curve": Method(
-            "RotationSpline", lambda: RotationSpline(t, rotations), None
-        ),
+        "SciPy, another curve": Method("RotationSpline", partial(RotationSpline, t, known), None),
     }
     return methods, None
 
@@ -336,7 +328,7 @@ def timing_of_poses(n, rng):
 
 def _by_toppra(curve, cells):
     """Let toppra compute the least time of a curve on [0, 1] with the same limits."""
-    linear, s = toppra.constraint.linear_constraint, np.linspace(0, 1, cells + 1)
+    linear, s = constraint.linear_constraint, np.linspace(0, 1, cells + 1)
     V, A = curve(s, 1), curve(s, 2)
 
     class Boxes(linear.LinearConstraint):
@@ -350,7 +342,7 @@ def _by_toppra(curve, cells):
     limit = Boxes()
     limit.dof, limit._format_string = 1, ""
     path = toppra.SplineInterpolator([0, 1], [[0], [1]])
-    solver = toppra.algorithm.TOPPRA([limit], path, gridpoints=s, solver_wrapper="seidel")
+    solver = algorithm.TOPPRA([limit], path, gridpoints=s, solver_wrapper="seidel")
     rate = solver.compute_parameterization(0, 0)[1]
     return [np.sum(2 / cells / (rate[1:] + rate[:-1]))]
 

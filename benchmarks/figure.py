@@ -32,11 +32,10 @@ def draw(rows):
         fig = plt.figure(figsize=(9, 16))
         above, middle, below = fig.subfigures(3, 1, height_ratios=[0.55, 3.15, 1.1])
         drawn = {row["method"] for row in rows if row["task"] in PANELS}
-        names = [name for name in LOOKS if name in drawn]
-        lines = [Line2D([], [], **LOOKS[name]) for name in names]
+        lines = [Line2D([], [], label=x, **look) for x, look in LOOKS.items() if x in drawn]
         title = "medians; the quartiles as bands, where they can be seen"
         spaces = {"handlelength": 3.5, "columnspacing": 3}
-        above.legend(lines, names, title=title, loc="center", ncols=2, **spaces)
+        above.legend(handles=lines, title=title, loc="center", ncols=2, **spaces)
         axes = middle.subplots(3, 2)
         for ax, task in zip(axes.flat, PANELS, strict=True):
             draw_over_size(ax, [row for row in rows if row["task"] == task])
@@ -56,8 +55,7 @@ def draw_over_size(ax, rows):
         middle, low, high = ([1e6 * row[name] for row in here] / n for name in TIMES)
         ax.plot(n, middle, **LOOKS[method])
         ax.fill_between(n, low, high, color=LOOKS[method]["color"], alpha=0.2, linewidth=0)
-    ax.set(xscale="log", yscale="log")
-    ax.set_xticks(sorted({row["N [1]"] for row in rows}))
+    ax.set(xscale="log", yscale="log", xticks=sorted({row["N [1]"] for row in rows}))
     ax.minorticks_off()
 
 
@@ -79,10 +77,3 @@ def draw_optimum(ax, rows):
     marks = [Line2D([], [], ls="", color="black", marker=mark) for mark in MARKERS.values()]
     shown = [f"Figure {case}" if case != "random" else case for case in MARKERS]
     ax.legend(marks, shown, loc="upper left", bbox_to_anchor=(1, 1))
-
-
-def save(fig, path):
-    """Save the figure as PNG and PDF, with the same bytes each time, and close it."""
-    for ending, varying in ((".png", "Software"), (".pdf", "CreationDate")):
-        fig.savefig(path.with_suffix(ending), metadata={varying: None})
-    plt.close(fig)

@@ -1,12 +1,10 @@
 """Write the results of a run as printed lines, as CSV, and as the table in README.md."""
 
 import csv
-import math
-from pathlib import Path
+from decimal import ROUND_DOWN, Context
 
 from benchmarks.contests import OURS
 
-README = Path(__file__).with_name("README.md")
 START, END = "<!-- benchmarks -->\n", "<!-- end of benchmarks -->\n"
 TABLE = [
     ("nearest rotation of {} matrices", "nearest rotation", "noisy"),
@@ -71,9 +69,7 @@ def readme_table(rows):
 
 def rounded_down(ratio):
     """Return a ratio as text with two significant digits, rounded towards 0."""
-    digits = 1 - math.floor(math.log10(ratio))
-    down = math.floor(ratio * 10.0**digits + 1e-9) / 10.0**digits
-    return f"{down:.{max(digits, 0)}f}"
+    return f"{Context(prec=2, rounding=ROUND_DOWN).create_decimal(f'{ratio:.3e}'):f}"
 
 
 def update_readme(rows, path):

@@ -6,7 +6,7 @@ import re
 import tracemalloc
 from importlib.metadata import version
 from pathlib import Path
-from time import perf_counter
+from timeit import default_timer, timeit
 
 import numpy as np
 
@@ -18,11 +18,10 @@ RATIOS = ("times ours [1]", "times ours low [1]", "times ours high [1]")
 
 
 def compete(contest, n, rng, machine, **timing):
-    """Time the methods of a contest at size n; return a list with a dict for each method."""
+    """Time the methods of a contest at size n; yield a dict for each method."""
     methods, error = contest.make(n, rng, *contest.options)
     times = in_turn([method.call for method in methods.values()], **timing)
     times /= [method.items for method in methods.values()]
-    rows = []
     for (name, method), column in zip(methods.items(), times.T, strict=True):
         off = error and method.value and float(error(np.asarray(method.value(method.call()))))
         # Python cannot measure the memory of these packages
@@ -37,11 +36,10 @@ def compete(contest, n, rng, machine, **timing):
         spreads = np.percentile([column, column / times[:, 0]], [50, 25, 75], axis=1)
         row |= zip(TIMES + RATIOS, spreads.T.ravel().tolist(), strict=True)
         row |= {"rounds [1]": len(times), "error [1]": off, "peak memory [B]": most}
-        rows.append(row | {"machine": machine})
-    return rows
+        yield row | {"machine": machine}
 
 
-def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=perf_counter):
+def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=default_timer):
     """Return the seconds per call, shape (rounds, calls); each round runs every call.
 
     A short call is repeated until about `loop` seconds have passed. There are between `fewest` and
@@ -49,16 +47,12 @@ def in_turn(calls, loop=0.02, total=15.0, fewest=5, most=15, clock=perf_counter)
     """
 
     def seconds(call, times):
-        start = clock()
-        for _ in range(times):
-            call()
-        return (clock() - start) / times
+        return timeit(call, timer=clock, number=times) / times
 
     once = np.min([[seconds(call, 1) for call in calls] for _ in range(2)], axis=0)
     loops = np.maximum(1, np.round(loop / np.maximum(once, 1e-7))).astype(int)
     rounds = int(np.clip(total // (loops @ once), fewest, most))
-    turns = list(zip(calls, loops, strict=True))
-    return np.array([[seconds(*turn) for turn in turns] for _ in range(rounds)])
+    return np.array([[seconds(*x) for x in zip(calls, loops, strict=True)] for _ in range(rounds)])
 
 
 def describe_machine():

@@ -13,13 +13,7 @@ from PIL import Image
 
 from rbcourse.draw.display import Display, Player
 from rbcourse.draw.pictures import drawn, painter
-from rbcourse.draw.save import (
-    Table,
-    caption,
-    csv_text,
-    figures_folder,
-    save_figure,
-)
+from rbcourse.draw.save import Table, caption, csv_text, figures_folder, save_figure
 from rbcourse.draw.space import scenes
 
 Update = Callable[[int], Sequence[Any]]
@@ -116,11 +110,8 @@ def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
 
     The fixed artists are drawn once, and restored before each frame. The axes must not change.
     """
-    before: Any = fig.canvas
     paint = painter(fig, update(0))
-    drawn = [paint(update(i)) for i in range(frames)]
-    fig.set_canvas(before)
-    return drawn
+    return [paint(update(i)) for i in range(frames)]
 
 
 def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:

@@ -13,7 +13,7 @@ from matplotlib.patches import Arc, Circle
 from numpy.typing import ArrayLike
 
 from rbcourse import Array
-from rbcourse.arm import LINKS, arm_forward_kinematics
+from rbcourse.arm import LINKS, arm_forward_kinematics, arm_tip_jacobian
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
 _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
@@ -61,7 +61,7 @@ def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[
     show_reach(ax, lengths)
     joints = _joints(q, lengths)
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=4, ms=8, alpha=0.75)
-    for i, column in enumerate(_columns(joints).T):
+    for i, column in enumerate(arm_tip_jacobian(q, lengths).T):
         colour = _LOOKS[i % len(_LOOKS)][0]
         artists.append(_draw_arrow(ax, joints[-1], column / 2, colour, f"motor {i} runs"))
     return artists
@@ -174,7 +174,7 @@ def describe_tip_velocities(postures: Mapping[str, Array], lengths: ArrayLike = 
     """Return a description of pictures of `draw_tip_velocities` on several axes."""
     said = []
     for name, q in postures.items():
-        x, y = _columns(_joints(q, lengths))
+        x, y = arm_tip_jacobian(q, lengths)
         said.append(f"{name}, to {_degrees(np.arctan2(y, x))} degrees")
     return (
         f"Velocity of the tip of an arm when one motor runs alone: {', '.join(postures)}. There "
@@ -186,12 +186,6 @@ def describe_tip_velocities(postures: Mapping[str, Array], lengths: ArrayLike = 
 def _joints(q: ArrayLike, lengths: ArrayLike) -> Array:
     """Return the positions of the joints and the tip, shape (..., n + 1, 2)."""
     return arm_forward_kinematics(q, lengths).joints
-
-
-def _columns(joints: Array) -> Array:
-    """Return the columns of the Jacobian: vectors from joints to the tip, turned left by 90°."""
-    x, y = (joints[-1] - joints[:-1]).T
-    return np.array([-y, x])
 
 
 def _draw_frame(ax: Axes, origin: Array, heading: float) -> list[Any]:

@@ -96,47 +96,18 @@ def set_space(
 ) -> None:
     """Fit the axes to a cube at these positions, shape (times, 3), and draw a floor and axes.
 
-    `view` is the elevation and the azimuth in degrees.
+    The axes have names and numbers in m. The vertical axis is at the corner that is farthest to
+    the left. `view` is the elevation and the azimuth in degrees.
     """
     low, high = places.min(axis=0) - 0.9 * side, places.max(axis=0) + 0.9 * side
     ax.fit(low, high, zoom)
     ax.view_init(*view)
-    draw_room(ax, low, high)
-
-
-def set_turning(ax: Any, reach: float) -> None:
-    """Fit the axes to a turning body whose points are within `reach` (in m) of the origin.
-
-    Draw the axes of the fixed frame, with their names, in a pale colour.
-    """
-    for name, room in zip("xyz", reach * np.eye(3), strict=True):
-        ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
-        ax.text(*(1.12 * room), name, color="0.5", ha="center", va="center")
-    ax.fit(np.full(3, -reach), np.full(3, reach), zoom=1.3)
-    ax.view_init(elev=20, azim=-55)
-
-
-def draw_ground(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor between two corners; its lines are at the numbers that `draw_room` writes."""
-    pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
-    for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
-        ax.plot([x, x], [low[1], high[1]], low[2], **pale)
-    for y in [low[1], *_ticks(low[1], high[1]), high[1]]:
-        ax.plot([low[0], high[0]], [y, y], low[2], **pale)
-
-
-def draw_room(ax: Any, low: Array, high: Array) -> None:
-    """Draw a floor between two corners, and three axes with names and numbers in m.
-
-    The vertical axis is at the corner that is farthest to the left.
-    """
     draw_ground(ax, low, high)
     ticks = [_ticks(*ends) for ends in zip(low, high, strict=True)]
     # each axis has a start, and an offset of its numbers
-    azimuth = np.radians(ax.azim)
+    azimuth = np.radians(view[1])
     left = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
-    farthest = np.where(left > 0, high, low) * [1, 1, 0] + low * [0, 0, 1]
-    corners = [low, np.array([high[0], *low[1:]]), farthest]
+    corners = [low, np.array([high[0], *low[1:]]), np.where(left > 0, high, low)]
     beside = 0.06 * np.max(high - low) * np.array([[0, -1, -0.4], [1, 0, -0.4], left])
     centred: Any = {"ha": "center", "va": "center", "zorder": 3}
     for k, name in enumerate("xyz"):
@@ -153,6 +124,28 @@ def draw_room(ax: Any, low: Array, high: Array) -> None:
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]
         ax.text(*place, f"{name} (m)", **centred)
+
+
+def set_turning(ax: Any, reach: float, zoom: float, lw: float = 2.0, named: bool = False) -> None:
+    """Fit the axes to a turning body whose points are within `reach` (in m) of the origin.
+
+    Draw the axes of the fixed frame in a pale colour, with the line width `lw` and maybe names.
+    """
+    for name, room in zip("xyz", reach * np.eye(3), strict=True):
+        ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=lw, zorder=0)
+        if named:
+            ax.text(*(1.12 * room), name, color="0.5", ha="center", va="center")
+    ax.fit(np.full(3, -reach), np.full(3, reach), zoom)
+    ax.view_init(elev=20, azim=-55)
+
+
+def draw_ground(ax: Any, low: Array, high: Array) -> None:
+    """Draw a floor between two corners; its lines are at the numbers that `set_space` writes."""
+    pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
+    for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
+        ax.plot([x, x], [low[1], high[1]], low[2], **pale)
+    for y in [low[1], *_ticks(low[1], high[1]), high[1]]:
+        ax.plot([low[0], high[0]], [y, y], low[2], **pale)
 
 
 def _ticks(low: float, high: float) -> list[float]:
@@ -186,17 +179,15 @@ def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
         ax.plot(*poses[:, :3, 3].T, label=name, **look)[0]
         for (name, poses), look in zip(ways.items(), looks, strict=False)
     ]
-    frames = [next(iter(ways.values()))[0]]
+    start, ends = next(iter(ways.values()))[0], list[Array]()
     for poses in ways.values():
-        if all(np.abs(poses[-1] - other).max() > 1e-9 for other in frames[1:]):
-            frames.append(poses[-1])
-    first, *others = frames
-    draw_triad(ax, first[:3, 3], first[:3, :3], "0")
-    for pose in others:
-        for axis, direction in zip("xyz", pose[:3, :3].T, strict=True):
-            draw_arrow(ax, pose[:3, 3], direction, COLOURS[axis])
+        if all(np.abs(poses[-1] - other).max() > 1e-9 for other in ends):
+            ends.append(poses[-1])
+    draw_triad(ax, start[:3, 3], start[:3, :3], "0")
+    for pose in ends:
+        draw_triad(ax, pose[:3, 3], pose[:3, :3])
     places = [poses[:, :3, 3] for poses in ways.values()]
-    tips = [A[:3, 3] + A[:3, :3].T for A in frames]
+    tips = [A[:3, 3] + A[:3, :3].T for A in (start, *ends)]
     set_space(ax, np.concatenate([*places, *tips]), 0.6, view=(32, -65), zoom=0.95)
     return lines
 
@@ -230,7 +221,8 @@ def moving_boxes(
             set_space(ax, poses[:, :3, 3], float(np.max(edges)))
             draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
         else:
-            set_turning(ax, 0.5 * float(np.linalg.norm(edges * np.ones(3))))
+            reach = 0.5 * float(np.linalg.norm(edges * np.ones(3)))
+            set_turning(ax, reach, zoom=1.3, named=True)
         ax.set_title(name)
 
     def update(i: int) -> list[Any]:
@@ -256,12 +248,13 @@ def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
     return said
 
 
-def draw_triad(ax: Any, origin: Array, R: Array, name: str) -> None:
-    """Draw the columns of R as arrows x, y, z from the point `origin`, labelled with the name."""
+def draw_triad(ax: Any, origin: Array, R: Array, name: str = "") -> None:
+    """Draw the columns of R as arrows from `origin`; a `name` adds letters with this index."""
     for axis, direction in zip("xyz", R.T, strict=True):
         draw_arrow(ax, origin, direction, COLOURS[axis])
-        letter: Any = {"color": COLOURS[axis], "ha": "center", "va": "center"}
-        ax.text(*(origin + 1.4 * direction), f"${axis}_{name}$", **letter)
+        if name:
+            letter: Any = {"color": COLOURS[axis], "ha": "center", "va": "center"}
+            ax.text(*(origin + 1.4 * direction), f"${axis}_{name}$", **letter)
 
 
 def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> None:

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backend_bases import RendererBase
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgba
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from rbcourse.draw.pictures import data_url
 from rbcourse.draw.scene import Piece, normal_of
 from rbcourse.draw.space import not_in_space, scenes
 
@@ -148,10 +149,8 @@ class Display(RendererBase):
         alpha = gc.get_alpha() if gc.get_forced_alpha() else None
         box = (clip.x0, self.height - clip.y1, clip.width, clip.height) if clip else ()
         return (
-            None if face is None else to_hex((*face[:3], _alpha(face, alpha)), keep_alpha=True),
-            to_hex((*gc.get_rgb()[:3], _alpha(gc.get_rgb(), alpha)), keep_alpha=True)
-            if width
-            else None,
+            None if face is None else to_hex(to_rgba(face, alpha), keep_alpha=True),
+            to_hex(to_rgba(gc.get_rgb(), alpha), keep_alpha=True) if width else None,
             width,
             tuple(round(self.points_to_pixels(dash), 3) for dash in dashes),
             "square" if gc.get_capstyle() == "projecting" else str(gc.get_capstyle()),
@@ -168,10 +167,6 @@ def _within(piece: Piece, reach: float) -> list[Piece]:
         cut = (part.cut(reach - part.places[:, :3] @ side) for part in parts)
         parts = [part for some in cut for where, part in some if where >= 0]
     return parts
-
-
-def _alpha(colour: Any, forced: float | None) -> float:
-    return forced if forced is not None else colour[3] if len(colour) > 3 else 1.0
 
 
 def _steps(points: Any) -> NDArray[np.int_]:
@@ -234,7 +229,7 @@ class Player:
         data = {
             "size": self.display.size,
             "rooms": self.display.rooms,
-            "background": _url(self.background),
+            "background": data_url(self.background),
             "states": _deflated(joined(self.states)),
             "known": _deflated(_json([list(self.display.styles), self.texts]).encode()),
             "controls": self.controls,
@@ -244,7 +239,7 @@ class Player:
             name=f"{self.name}_{zlib.crc32(self.alt.encode()):08x}",
             width=self.display.width,
             alt=html.escape(self.alt),
-            still=_url(self.shown),
+            still=data_url(self.shown),
             caption=self.caption,
             engine=re.sub(r"^\s+(//.*)?|\n(?=\n)", "", engine, flags=re.MULTILINE),
             data=_json(data).replace("<", "\\u003c"),
@@ -257,7 +252,3 @@ def _json(data: Any) -> str:
 
 def _deflated(content: bytes) -> str:
     return base64.b64encode(zlib.compress(content, 9)).decode()
-
-
-def _url(png: bytes) -> str:
-    return f"data:image/png;base64,{base64.b64encode(png).decode()}"

@@ -1,5 +1,6 @@
 """Figures as pictures: the fixed artists are drawn only once, and PNGs are small."""
 
+import base64
 import io
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,19 +12,19 @@ from PIL import Image
 
 from rbcourse.draw.space import not_in_space, scenes
 
-Paint = Callable[[Sequence[Any] | None], Image.Image]
 
-
-def painter(fig: Figure, moving: Sequence[Any]) -> Paint:
+def painter(fig: Figure, moving: Sequence[Any]) -> Callable[[Sequence[Any] | None], Image.Image]:
     """Draw the fixed artists once; return a function that draws moving artists over them.
 
     The function also draws the scenes of the figure. With None instead of artists, it gives the
     background alone.
     """
+    before: Any = fig.canvas
     canvas: Any = FigureCanvasAgg(fig)  # Matplotlib does not annotate its methods
     for artist in [*scenes(fig), *not_in_space(moving)]:
         artist.set_animated(True)
     canvas.draw()
+    fig.set_canvas(before)
     background = canvas.copy_from_bbox(fig.bbox)
 
     def paint(artists: Sequence[Any] | None) -> Image.Image:
@@ -42,21 +43,21 @@ def drawn(
 
     With None instead of artists, the PNG shows the background alone, without scenes.
     """
-    before, dpi = fig.canvas, fig.dpi
+    dpi = fig.dpi
     fig.set_dpi(zoom * dpi)
     picture = painter(fig, moving)(artists)
     fig.set_dpi(dpi)
-    fig.set_canvas(before)
-    return png(few_colours(picture))
-
-
-def few_colours(picture: Image.Image) -> Image.Image:
-    """Return a picture in 256 colours, without dithering."""
-    return picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    return png(picture)
 
 
 def png(picture: Image.Image) -> bytes:
-    """Return a picture as a PNG."""
+    """Return a picture as a PNG in 256 colours, without dithering."""
     content = io.BytesIO()
-    picture.save(content, "png", optimize=True)
+    few_colours = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    few_colours.save(content, "png", optimize=True)
     return content.getvalue()
+
+
+def data_url(png: bytes) -> str:
+    """Return the address of a PNG that is a part of the page."""
+    return f"data:image/png;base64,{base64.b64encode(png).decode()}"

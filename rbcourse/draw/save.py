@@ -4,7 +4,6 @@ A table is a dict of columns of equal shape, with units in their names:
 ``{"t [1]": ..., "angle [rad]": ..., "theta [1]": ...}``.
 """
 
-import base64
 import csv
 import html
 import io
@@ -13,7 +12,6 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -21,18 +19,9 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from PIL import Image
 
-from rbcourse import (
-    Curve,
-    bezier_so3,
-    cayley_cubic_so3,
-    corrected_bezier_so3,
-    cumulative_bezier_so3,
-    exponential_cubic_so3,
-    projected_cubic_so3,
-    quaternion_cubic_so3,
-)
+import rbcourse as rb
 from rbcourse.draw.display import Display, Player
-from rbcourse.draw.pictures import drawn, few_colours, png
+from rbcourse.draw.pictures import data_url, drawn, png
 from rbcourse.draw.space import scenes
 
 Table = Mapping[str, ArrayLike]
@@ -54,14 +43,14 @@ COLOURS = {
 """Colours by meaning, the same in all figures; they are distinct for the colour-blind."""
 PALE = "#8F8F8F"
 """The colour of the background artists, which has a contrast of 3 on white."""
-FORMS: dict[str, Callable[..., Curve]] = {
-    "projection": projected_cubic_so3,
-    "exponential": exponential_cubic_so3,
-    "Bézier": bezier_so3,
-    "corrected": corrected_bezier_so3,
-    "cumulative": cumulative_bezier_so3,
-    "quaternion": quaternion_cubic_so3,
-    "Cayley": cayley_cubic_so3,
+FORMS: dict[str, Callable[..., rb.Curve]] = {
+    "projection": rb.projected_cubic_so3,
+    "exponential": rb.exponential_cubic_so3,
+    "Bézier": rb.bezier_so3,
+    "corrected": rb.corrected_bezier_so3,
+    "cumulative": rb.cumulative_bezier_so3,
+    "quaternion": rb.quaternion_cubic_so3,
+    "Cayley": rb.cayley_cubic_so3,
 }
 """The closed forms by their short names in figures and tables."""
 
@@ -92,10 +81,9 @@ class Picture:
         return f"{self.name}: {self.alt}"
 
     def _repr_html_(self) -> str:
-        source = base64.b64encode(self.png).decode()
         return (
             f'<figure><img width="{self.width}" style="max-width: 100%" '
-            f'alt="{html.escape(self.alt)}" src="data:image/png;base64,{source}"/>'
+            f'alt="{html.escape(self.alt)}" src="{data_url(self.png)}"/>'
             f"{caption(self.alt, f'{self.name}.png, .pdf, .csv')}</figure>"
         )
 
@@ -126,7 +114,7 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
     folder = figures_folder()
     content = io.BytesIO()
     fig.savefig(content, format="png")
-    picture = png(few_colours(Image.open(content)))
+    picture = png(Image.open(content))
     if folder:
         fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
         (folder / f"{name}.png").write_bytes(picture)
@@ -181,7 +169,8 @@ def csv_text(data: Table) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(zip(*(map(_cell, column.ravel()) for column in columns.values()), strict=True))
+    cells = (x if x.dtype.kind == "U" else np.strings.mod("%.12g", x) for x in columns.values())
+    writer.writerows(zip(*map(np.ravel, cells), strict=True))
     return text.getvalue()
 
 
@@ -206,7 +195,3 @@ def in_words(value: float, scale: float) -> str:
     """
     digits = 2 - int(np.floor(np.log10(scale))) if scale > 0 else 0
     return f"{np.round(float(value), digits) + 0.0:.10g}"
-
-
-def _cell(value: Any) -> str:
-    return str(value) if isinstance(value, str) else f"{value:.12g}"

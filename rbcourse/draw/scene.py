@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.backend_bases import GraphicsContextBase
+from matplotlib.cbook import contiguous_regions
 from matplotlib.path import Path
 
 from rbcourse import Array
@@ -75,29 +76,22 @@ class Piece:
             return [(low + high, self)]
         closed = self.kind == "face"
         opaque = (self.fill or self.gc.get_rgb())[3] == 1 and self.gc.get_dashes()[1] is None
-        parts: dict[int, list[list[Array]]] = {-1: [[]], 1: [[]]}
+        points = []  # the side of each point, and its place in the parts below and above the plane
         for i, (p, s) in enumerate(zip(self.places, side, strict=True)):
-            for t in (-1, 1):
-                if s in (t, 0):
-                    parts[t][-1].append(p)
-                elif not closed and parts[t][-1]:
-                    parts[t].append([])  # the line leaves this side at a point in the plane
+            points.append((s, p, p))
             j = (i + 1) % len(side)
             if s * side[j] < 0 and (closed or j):
                 q = p + height[i] / (height[i] - height[j]) * (self.places[j] - p)
                 below = (p if s < 0 else self.places[j]) - q
                 more = opaque * min(1.0, overlap / float(np.linalg.norm(below[:3])))
-                ends = {-1: q, 1: q + more * below}
-                parts[s][-1].append(ends[s])
-                if not closed:
-                    parts[s].append([])
-                parts[-s][-1].append(ends[-s])
-        return [
-            (t, replace(self, places=np.array(run)))
-            for t, runs in parts.items()
-            for run in runs
-            if len(run) > (2 if closed else 1)
-        ]
+                points.append((0, q, q + more * below))
+        sides, *both = map(np.array, zip(*points, strict=True))
+        parts = []
+        for t, places in zip((-1, 1), both, strict=True):
+            there = t * sides >= 0
+            runs = [there] if closed else [slice(*ends) for ends in contiguous_regions(there)]
+            parts += [(t, replace(self, places=places[run])) for run in runs]
+        return [(t, part) for t, part in parts if len(part.places) > (2 if closed else 1)]
 
 
 def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piece]:
@@ -106,7 +100,12 @@ def in_sight(pieces: list[Piece], eye: Array, overlap: float = 0.0) -> list[Piec
     The parts of a cut piece overlap by `overlap` pixels (see `Piece.cut`). Each face becomes two
     pieces: its filling, and its edge, which is not drawn where the face is cut.
     """
-    parts = [part for piece in pieces for part in _filling_and_edge(piece)]
+    parts: list[Piece] = []
+    for piece in pieces:
+        if piece.kind == "face":
+            parts += [replace(piece, gc=context(None, 0)), piece.edge]
+        else:
+            parts.append(piece)
     hidden, seen = ([p for p in parts if (p.zorder >= OVER) is over] for over in (False, True))
     return [*in_order(hidden, eye, overlap), *sorted(seen, key=lambda piece: piece.zorder)]
 
@@ -171,12 +170,6 @@ def whole_pixels(depth: Any) -> Any:
     fraction of 0.7.
     """
     return np.floor(depth + 0.3)
-
-
-def _filling_and_edge(piece: Piece) -> list[Piece]:
-    if piece.kind != "face":
-        return [piece]
-    return [replace(piece, gc=context(None, 0)), piece.edge]
 
 
 def normal_of(corners: Array) -> Array:

@@ -15,6 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backend_bases import GraphicsContextBase, RendererBase
+from matplotlib.cbook import contiguous_regions
 from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.path import Path
@@ -49,19 +50,12 @@ class Faces(Artist):
         The corners of each face, in order around it.
     colours : sequence of colours
         The colour of each face.
-    edgecolor : colour, optional
-    linewidth : float, optional
-        The width of the edges, in points.
     """
 
-    def __init__(
-        self, corners: Array, colours: Any, edgecolor: Any = "0.3", linewidth: float = 0.8
-    ) -> None:
+    def __init__(self, corners: Array, colours: Any) -> None:
         super().__init__()
         self.corners = corners
-        self.set_colours(colours)
-        self.set_edgecolor(edgecolor)
-        self.set_linewidth(linewidth)
+        self.set(colours=colours, edgecolor="0.3", linewidth=0.8)
 
     def set_colours(self, colours: Any) -> None:
         """Set the colour of each face; a face with the colour "none" is not filled."""
@@ -93,22 +87,12 @@ class Faces(Artist):
 
 
 class Ball(Artist):
-    """A ball of white glass; artists behind it or on its far side look pale.
-
-    Parameters
-    ----------
-    radius : float, optional
-        The radius of the ball, whose centre is the origin.
-    """
-
-    def __init__(self, radius: float = 1.0) -> None:
-        super().__init__()
-        self.radius = radius
+    """A unit ball of white glass at the origin; artists behind it or on its far side look pale."""
 
     def pieces(self, scale: float, middle: Array) -> Iterable[Piece]:
         """Return the visible disc; its plane passes through the centre."""
         turn = np.linspace(0, 2 * np.pi, 91)
-        disc = Path(scale * self.radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
+        disc = Path(scale * np.stack([np.cos(turn), np.sin(turn)], axis=-1))
         fill = to_rgba("white", 0.7)
         place = -scale * middle[None]
         yield Piece("ball", place, context(to_rgba("0.8"), 0.8), fill, (disc,))
@@ -359,25 +343,19 @@ def _strokes(artist: Line3D, looks: Looks, sight: Sight) -> Iterable[Piece]:
             some = marked[np.isfinite(marked).all(axis=1)]
             yield Piece("mark", some, gc, fill, marker, artist.get_zorder())
         else:
-            for run in _runs(places):
-                yield Piece("line", _along(run, sight), gc, zorder=artist.get_zorder())
+            for start, stop in contiguous_regions(np.isfinite(places).all(axis=1)):
+                if stop - start > 1:
+                    run = _along(places[start:stop], sight)
+                    yield Piece("line", run, gc, zorder=artist.get_zorder())
 
 
 def _marked(every: Any) -> Any:
     """Return an index that selects the points of a line that have a marker."""
-    if isinstance(every, Integral):
-        return slice(None, None, int(every))
-    if every is None or isinstance(every, list | slice):
-        return slice(None) if every is None else every
+    if every is None or isinstance(every, Integral):
+        return slice(None, None, every)
+    if isinstance(every, list | slice):
+        return every
     raise ValueError(f"markevery: None, an integer, a list or a slice is wanted, got {every!r}")
-
-
-def _runs(places: Array) -> list[Array]:
-    """Split a line at points that are not finite."""
-    gaps = np.flatnonzero(~np.isfinite(places).all(axis=1))
-    parts = np.split(places, gaps)
-    kept = (part[np.isfinite(part).all(axis=1)] for part in parts)
-    return [part for part in kept if len(part) > 1]
 
 
 def _along(places: Array, sight: Sight) -> Array:

@@ -14,13 +14,6 @@ Images = Mapping[str, tuple[Array, Array]]
 """The images of v0 and of v1, both of shape (n, 3), for each sample of n rotations."""
 
 ELEVATION, AZIMUTH = np.radians(20), np.radians(-60)
-EYE = np.array(
-    [
-        np.cos(ELEVATION) * np.cos(AZIMUTH),
-        np.cos(ELEVATION) * np.sin(AZIMUTH),
-        np.sin(ELEVATION),
-    ]
-)
 
 
 def draw_sphere(ax: Any) -> None:

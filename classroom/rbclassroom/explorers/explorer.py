@@ -1,6 +1,5 @@
 """The base class of explorers: pictures that readers change with sliders."""
 
-import base64
 import html
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,8 +18,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from rbcourse import angle_between
+from rbcourse.draw.bodies import set_turning
 from rbcourse.draw.display import ENGINE, Display, joined
-from rbcourse.draw.pictures import drawn
+from rbcourse.draw.pictures import data_url, drawn
 
 LABELS = 13.0
 """Size of all letters in the pictures, in points: 18 pixels."""
@@ -205,10 +205,10 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
 
     def _repr_mimebundle_(self, **kwargs: Any) -> dict[str, Any]:
         """Return the explorer, and a still picture for readers without a kernel."""
-        source = base64.b64encode(self.draw(self.state().shown)).decode()
+        picture = data_url(self.draw(self.state().shown))
         still = (
             f'<figure><img style="max-width: 100%" alt="{html.escape(repr(self))}" '
-            f'src="data:image/png;base64,{source}"/><figcaption>{html.escape(self.name)}: '
+            f'src="{picture}"/><figcaption>{html.escape(self.name)}: '
             "a still. Run this cell (Shift + Enter) to get its sliders</figcaption></figure>"
         )
         return {"text/html": still, **super()._repr_mimebundle_(**kwargs)}
@@ -226,10 +226,7 @@ def new_figure() -> Iterator[Figure]:
 def new_space(fig: Figure, place: tuple[float, float, float, float], reach: float) -> Any:
     """Add axes for bodies that turn about the origin, with pale lines for the fixed axes."""
     ax: Any = fig.add_axes(place, projection="space")
-    for room in reach * np.eye(3):
-        ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=1.5, zorder=0)
-    ax.fit(np.full(3, -reach), np.full(3, reach), zoom=1.25)
-    ax.view_init(elev=20, azim=-55)
+    set_turning(ax, reach, zoom=1.25, lw=1.5)
     return ax
 
 

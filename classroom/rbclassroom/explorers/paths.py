@@ -124,10 +124,9 @@ def chain_explorer() -> Explorer:
         space = new_space(fig, (-0.06, -0.1, 0.74, 1.2), 2.15)
         artists: dict[str, Any] = {
             "way": new_line(space, color=COLOURS["path"]),
-            "poses": new_line(space, color=COLOURS["reference"], marker="o", ls=""),
+            "poses": space.plot(*POSES[:, :3, 3].T, "o", color=COLOURS["reference"])[0],
             "box": draw_box(space, POSES[0], EDGES),
         }
-        artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
         for i, (name, high) in enumerate(_WAYS.items()):
             ax = fig.add_axes((0.66, 0.64 - 0.46 * i, 0.31, 0.27))
             ax.set(xlim=(0, _LONGEST), ylim=(0, high), xticks=[0, 4, 8, 12], title=name)

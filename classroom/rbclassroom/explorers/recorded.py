@@ -66,8 +66,10 @@ def record(
     step. The other controls keep their present values.
     """
     now, plays, time = explorer.values, explorer.plays, explorer.time
+    start = time.index % stride
+    recorded = {**moved, plays: explorer.steps[start::stride]}
     label = {each: control.description for each, control in explorer.controls.items()}
-    stays = [f"{label[each]} = {_text(now[each])}" for each in now if each not in {*moved, plays}]
+    stays = [f"{label[each]} = {_text(now[each])}" for each in now if each not in recorded]
     fixed = f" These controls are fixed here: {'; '.join(stays)}." if stays else ""
     caption = (
         f"{html.escape(explorer.name)} <details><summary>About this picture</summary>"
@@ -75,22 +77,19 @@ def record(
     )
     shown = explorer.state()
     still = explorer.draw(shown.shown, zoom=2)  # drawn now, because recording moves the artists
-    start = time.index % stride
-    steps = explorer.steps[start::stride]
     states = [
-        explorer.state(**dict(zip([*moved, plays], values, strict=True)))
-        for values in product(*moved.values(), steps)
+        explorer.state(**dict(zip(recorded, values, strict=True)))
+        for values in product(*recorded.values())
     ]
-    controls = [
+    controls: list[dict[str, Any]] = [
         {
             "label": label[each],
             "values": [_text(value) for value in values],
             "first": list(values).index(now[each]),
         }
-        for each, values in moved.items()
+        for each, values in recorded.items()
     ]
-    labels = list(time._options_labels)[start::stride]
-    first = (time.index - start) // stride
+    controls[-1]["values"] = time._options_labels[start::stride]  # with equally many digits
     return Player(
         name,
         shown.texts[-1],
@@ -99,7 +98,7 @@ def record(
         explorer.background,
         explorer.display,
         [state.drawn for state in states],
-        [*controls, {"label": label[plays], "values": labels, "first": first}],
+        controls,
         explorer.play.interval * stride,
         [state.texts for state in states],
     )

@@ -31,12 +31,10 @@ def timing_explorer() -> Explorer:
     with new_figure() as fig:
         space = new_space(fig, (-0.06, 0.08, 0.56, 0.9), 2.4)
         artists: dict[str, Any] = {
-            "way": new_line(space, color=COLOURS["path"]),
-            "poses": new_line(space, color=COLOURS["reference"], marker="o", ls=""),
+            "way": space.plot(*path(np.linspace(0, 3, 121))[:, :3, 3].T, color=COLOURS["path"])[0],
+            "poses": space.plot(*POSES[:, :3, 3].T, "o", color=COLOURS["reference"])[0],
             "box": draw_box(space, POSES[0], EDGES),
         }
-        artists["poses"].set_data_3d(*POSES[:, :3, 3].T)
-        artists["way"].set_data_3d(*path(np.linspace(0, 3, 121))[:, :3, 3].T)
         ax = fig.add_axes((0.53, 0.18, 0.45, 0.46))
         ax.set(xlim=(0, 3), ylim=(0, _HIGHEST), xticks=[0, 1, 2, 3], xlabel="s", ylabel="rate ṡ")
         for knot in (1, 2):

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from rbclassroom.figures import vectors
 from rbcourse import Array, pose_from_components
-from rbcourse.draw.bodies import draw_arrow, draw_box
+from rbcourse.draw.bodies import draw_arrow, draw_box, set_turning
 from rbcourse.draw.save import COLOURS, Table
 
 _LOOKS = {"α": (COLOURS["z"], "-"), "β": (COLOURS["y"], "-."), "γ": (COLOURS["x"], "--")}
@@ -52,13 +52,10 @@ def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> None:
     for ax, name, turned in zip(axes, names, R, strict=True):
         pose = pose_from_components(turned, np.zeros(3))
         draw_box(ax, pose, np.array([1.6, 1.0, 0.3]))
-        for room in 1.3 * np.eye(3):
-            ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=2, zorder=0)
+        set_turning(ax, 1.3, zoom=1.4)
         for axis, direction in zip("xyz", turned.T, strict=True):
             draw_arrow(ax, np.zeros(3), 1.2 * direction, COLOURS[axis])
             ax.text(*(1.45 * direction), axis, color=COLOURS[axis], ha="center", va="center")
-        ax.fit(np.full(3, -1.3), np.full(3, 1.3), zoom=1.4)
-        ax.view_init(elev=20, azim=-55)
         ax.set_title(name)
 
 

@@ -35,8 +35,8 @@ def histograms(R: Mapping[str, Array]) -> Bins:
         cosine = (np.trace(matrices, axis1=-2, axis2=-1) - 1) / 2
         values = np.arccos(np.clip(cosine, -1, 1)), matrices[:, 2, 0], matrices[:, 2, 2]
         for x, (edges, densities) in zip(values, bins.values(), strict=True):
-            counts, _ = np.histogram(np.clip(x, edges[0], edges[-1]), edges)
-            densities[name] = counts / (len(matrices) * np.diff(edges))
+            inside = np.clip(x, edges[0], edges[-1])
+            densities[name], _ = np.histogram(inside, edges, density=True)
     return bins
 
 

@@ -78,7 +78,6 @@ def describe_speeds(data: Table) -> str:
 
 
 _FREE = "{} {} [rad]"
-_STRAIGHT = "straight"
 _COORDINATES = {
     "exponential coordinates": "y = log(R₀$^T$R)",
     "normal coordinates": "x, to second order",
@@ -97,7 +96,7 @@ def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
     rest = np.zeros(3)
     normal = normal_cubic_so3(np.eye(3), R, rest, rest, inertia).controls[..., 1, :]
     line = np.multiply.outer(t, w)
-    kinds = dict(zip((_STRAIGHT, *_COORDINATES), (line, log_so3(R), normal), strict=True))
+    kinds = dict(zip(("straight", *_COORDINATES), (line, log_so3(R), normal), strict=True))
     found = {f"{kind} {k + 1}": x[:, k] for kind, x in kinds.items() for k in range(len(w))}
     return {"t [s]": t} | columns(_FREE, found, "xy")
 

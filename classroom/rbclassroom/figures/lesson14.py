@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 import rbcourse as rb
+from rbclassroom.figures import named
 from rbcourse import Array, Curve
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
@@ -147,10 +148,9 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
         dots = angle + 2 * np.pi * np.arange(-20, 20)
         dots = dots[(dots > low) & (dots < high)]
         axes[0].plot(np.full(len(dots), clock), dots, "o", color=PALE, ms=4, zorder=0)
-    names = list(data)[1::2]
-    for name, angle, bend, look in zip(names, columns[::2], columns[1::2], _TURNS, strict=True):
-        for ax, values in zip(axes, (angle, bend), strict=True):
-            ax.plot(t, values, label=name.removesuffix(" [rad]"), **look)
+    for (name, bend), look in zip(named(" bend [rad]", data).items(), _TURNS, strict=True):
+        for ax, values in zip(axes, (data[f"{name} [rad]"], bend), strict=True):
+            ax.plot(t, values, label=name, **look)
     axes[0].set(xlabel="time (s)", ylabel="angle θ (rad)", ylim=(low, high))
     axes[1].set(xlabel="time (s)", ylabel="θ less the straight line (rad)")
     axes[1].legend(loc="center", bbox_to_anchor=(0.47, 0.52))
@@ -158,11 +158,10 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
 
 def describe_turns(data: Table) -> str:
     """Return a description of the picture of `draw_turns`."""
-    names, values = list(data)[1::2], [np.asarray(x) for x in data.values()]
     said = (
-        f"{name.removesuffix(' [rad]')} to {in_words(x[-1], 10)} rad, at most "
+        f"{name} to {in_words(np.asarray(data[f'{name} [rad]'])[-1], 10)} rad, at most "
         f"{in_words(np.abs(bend).max(), 1)} rad off the straight line"
-        for name, x, bend in zip(names, values[1::2], values[2::2], strict=True)
+        for name, bend in named(" bend [rad]", data).items()
     )
     return (
         "Cubic splines through three rotations about one axis, with different whole turns: the "
@@ -207,10 +206,9 @@ def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
 
 def draw_excesses(ax: Axes, data: Table) -> None:
     """Draw an `excess_table` on logarithmic axes."""
-    legs, *columns = data.values()
-    ticks = np.degrees(legs).round(9)
-    for (name, look), values in zip(EXCESSES.items(), columns, strict=True):
-        ax.loglog(ticks, values, label=name, **look)
+    ticks = np.degrees(data["leg [rad]"]).round(9)
+    for name, values in named(" [1]", data).items():
+        ax.loglog(ticks, values, label=name, **EXCESSES[name])
     ax.set(xlabel="turn of a leg (°)", ylabel="excess over the optimum")
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
     ax.minorticks_off()
@@ -219,12 +217,8 @@ def draw_excesses(ax: Axes, data: Table) -> None:
 
 def describe_excesses(data: Table) -> str:
     """Return a description of the picture of `draw_excesses`."""
-    legs, *columns = (np.asarray(x) for x in data.values())
-    legs = np.degrees(legs)
-    said = (
-        f"{name} {100 * x[0]:.2g} % to {100 * x[-1]:.2g} %"
-        for name, x in zip(EXCESSES, columns, strict=True)
-    )
+    legs, found = np.degrees(data["leg [rad]"]), named(" [1]", data).items()
+    said = (f"{name} {100 * x[0]:.2g} % to {100 * x[-1]:.2g} %" for name, x in found)
     return (
         "Excess of curves through ten rotations over the cheapest one, over the turn of a leg. "
         f"Both axes are logarithmic. From {legs[0]:.0f} to {legs[-1]:.0f} degrees: "

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
+from rbclassroom.figures import named
 from rbclassroom.figures.lesson14 import profile_table
 from rbcourse import Array, Curve, Timed
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
@@ -125,9 +126,8 @@ def share_table(motion: Curve, limits: dict[str, float]) -> Table:
 
 def draw_shares(ax: Axes, data: Table) -> None:
     """Draw a `share_table`."""
-    t, *shares = (np.asarray(x) for x in data.values())
-    for name, share in zip(list(data)[1:], shares, strict=True):
-        label = name.removesuffix(" [1]")
+    t = np.asarray(data["t [s]"])
+    for label, share in named(" [1]", data).items():
         ax.plot(t, share, label=label, **_SHARES[label.replace(" ", "_")])
     ax.axhline(1, color=PALE, lw=1, zorder=0)
     ax.set(xlabel="time (s)", ylabel="share of the limit", ylim=(0, 1.08), xlim=(t[0], t[-1]))
@@ -136,7 +136,7 @@ def draw_shares(ax: Axes, data: Table) -> None:
 
 def describe_shares(data: Table) -> str:
     """Return a description of the picture of `draw_shares`."""
-    shares = {name.removesuffix(" [1]"): np.asarray(x) for name, x in list(data.items())[1:]}
+    shares = named(" [1]", data)
     said = (f"{name} {100 * np.mean(x > 0.99):.0f} %" for name, x in shares.items())
     some = np.mean(np.max(list(shares.values()), axis=0) > 0.99)
     return (

@@ -205,9 +205,7 @@ def quantile(x: Array, share: float, decimals: int = 8) -> Array:
     >>> float(quantile(np.array([3.0, 1.23456, np.nan, 0.1]), 0.5))
     1.235
     """
-    ordered, count = np.sort(x, axis=-1), np.sum(~np.isnan(x), axis=-1, keepdims=True)  # NaN last
-    place = np.maximum(np.ceil(share * count).astype(int) - 1, 0)
-    return rounded(np.take_along_axis(ordered, place, axis=-1)[..., 0], decimals)
+    return rounded(np.nanquantile(x, share, axis=-1, method="inverted_cdf"), decimals)
 
 
 def rounded(x: Array, decimals: int = 8) -> Array:

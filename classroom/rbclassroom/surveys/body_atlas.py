@@ -165,10 +165,7 @@ def stored(table: str) -> dict[str, NDArray[Any]]:
 
 
 def make_tables(
-    executor: Executor,
-    tables: Path = TABLES,
-    draws: int = DRAWS,
-    seeds: Sequence[int] = SEEDS,
+    executor: Executor, tables: Path = TABLES, draws: int = DRAWS, seeds: Sequence[int] = SEEDS
 ) -> None:
     """Compute the atlas; write the `maps` of the first seed and the `intervals` of all seeds."""
     parts, first = list[dict[str, Array]](), dict[str, dict[str, Array]]()

@@ -83,10 +83,8 @@ def survey(
     >>> bool(np.all(found["projection"] > found["optimum"]))
     True
     """
-    if inertia is not None:
-        rb.acceleration_cost(
-            rb.geodesic_so3(np.eye(3), np.eye(3)), inertia
-        )  # this raises ValueError if the inertia is invalid
+    if inertia is not None:  # raise a ValueError if the inertia is invalid
+        rb.acceleration_cost(rb.geodesic_so3(np.eye(3), np.eye(3)), inertia)
     ways = closed_forms(inertia) if ways is None else ways
     for name, make in ways.items():
         try:
@@ -96,24 +94,20 @@ def survey(
                 f"ways: make(R0, R1, w0, w1) is wanted, got {name!r}: {error}"
             ) from error
     if "optimum" in ways:
-        raise ValueError(
-            "ways: names other than 'optimum' are wanted, because the optimum is the reference"
-        )
+        raise ValueError("ways: names other than 'optimum', which is the reference, are wanted")
     measures = {name: partial(costs, make, inertia=inertia) for name, make in ways.items()}
     return _in_chunks({"optimum": partial(_least, inertia), **measures}, problems, executor, report)
 
 
-def several_starts(
-    problems: Ends, executor: Executor | None = None, *, report: Report | None = None
-) -> dict[str, Array]:
+def several_starts(problems: Ends, *, report: Report | None = None) -> dict[str, Array]:
     """Return the costs of the curves that Newton's method finds from each of several guesses.
 
-    The guesses are `starts`, and the body is a ball. `problems`, `executor` and `report` are those
-    of `survey`. The curves are stationary, but none is proven to be the best. If no curve is found,
+    The guesses are `starts`, and the body is a ball. `problems` and `report` are those of
+    `survey`. The curves are stationary, but none is proven to be the best. If no curve is found,
     the cost is NaN (BK (19)).
     """
     measures = {name: partial(_stationary, make) for name, make in starts().items()}
-    return _in_chunks(measures, problems, executor, report)
+    return _in_chunks(measures, problems, None, report)
 
 
 def costs(make: Maker, problems: Ends, inertia: ArrayLike | None = None) -> Array:
@@ -150,10 +144,7 @@ def _stationary(make: Maker, chunk: Ends) -> Array:
 
 
 def _in_chunks(
-    measures: Measures,
-    problems: Ends,
-    executor: Executor | None,
-    report: Report | None,
+    measures: Measures, problems: Ends, executor: Executor | None, report: Report | None
 ) -> dict[str, Array]:
     """Return the values of some functions of N problems, computed chunk by chunk."""
     problems, work = Ends(*problems), partial(_of_chunk, measures)
