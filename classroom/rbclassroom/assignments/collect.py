@@ -207,10 +207,8 @@ def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
     best = max(sets, key=lambda name: (shared[name], name in named))
     if not shared[best]:
         return "", "it is not a notebook of a handout"
-    return (
-        best,
-        "" if best in named or not named else f"its name is {named[0]}, its cells are of {best}",
-    )
+    misnamed = named and best not in named
+    return best, f"its name is {named[0]}, its cells are of {best}" if misnamed else ""
 
 
 def _plain(name: str) -> str:

@@ -88,13 +88,10 @@ def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> di
     if "law" not in known:
         known |= {"drawing": drawing, "names": names[drawing:], "inputs": inputs}
         known["answers"] = run(space[_name(answer)])
-    known["mistakes"] = [
-        {
-            "hint": m["hint"],
-            "results": [run(function_of(answer, code, space)) for code in m["code"]],
-        }
-        for m in problem["mistakes"]
-    ]
+    known["mistakes"] = []
+    for mistake in problem["mistakes"]:
+        functions = (function_of(answer, code, space) for code in mistake["code"])
+        known["mistakes"].append({"hint": mistake["hint"], "results": list(map(run, functions))})
     return known
 
 

@@ -27,6 +27,7 @@ from jinja2 import Environment, FileSystemLoader
 from rbclassroom.assignments.handout import pack, release
 from rbclassroom.book import lessons, places, reference
 from rbclassroom.book.citations import listed, names, with_citations
+from rbclassroom.book.lessons import write
 from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
 from rbclassroom.course import ledger
 from rbclassroom.course.notebooks import lesson_paths, living
@@ -82,7 +83,7 @@ class Sources:
 
     def put(self, page: str, text: str) -> None:
         """Write the source of a page, and copy the linked files that have no page."""
-        _write(self.folder / page, text)
+        write(self.folder / page, text)
         for name in re.findall(r"\]\((?:\.\./)*files/([^)#]+)", text):
             target = self.folder / "files" / name
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -97,20 +98,20 @@ class Sources:
     def put_lessons(self) -> None:
         """Write the lessons, their run sheets and their slides."""
         figures, works, shown = list[lessons.Figure](), defaultdict(list), []
+        where = self.extra / "lessons"
         readme = self.read("README.md")
         decks = {path.stem: deck_of(path) for path in lesson_paths(self.root / "notebooks")}
         pictures = sorted((self.root / "figures").glob("*.png"))
         known = {path.read_bytes(): f"../figures/{path.name}" for path in pictures}
         for path in lesson_paths(self.root / "notebooks"):
             page, notebook = f"lessons/{path.name}", nbformat.read(path, as_version=4)
-            _write(self.extra / page, nbformat.writes(lessons.without_outputs(notebook)) + "\n")
+            write(self.extra / page, nbformat.writes(lessons.without_outputs(notebook)) + "\n")
             title = notebook.cells[0].source.splitlines()[0].removeprefix("# ")
             figures += lessons.figures_of(path.name, notebook)
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
             picture = decks[path.stem].sections[0][0].picture
             lead = picture.html.partition("<script")[0] if picture else ""
-            where = self.extra / "lessons"
             sheet = lessons.prepared(notebook, path.name, self.root, known, where, lead)
             lessons.add_buttons(notebook, path.name, self.repository)
             if self.live:
@@ -136,15 +137,12 @@ class Sources:
                 }
             )
         self.shown |= {"lessons": shown, "figures": figures, "works": sorted(works.items())}
-        beside = {
-            content: re.sub("^pictures", "../lessons/pictures", to) for content, to in known.items()
-        }
 
         def ready(deck: str) -> str:
-            stills = lessons.with_picture_files(
-                deck, beside, self.extra / "slides", loading="eager"
-            )
-            return lessons.with_script_files(stills, self.extra / "lessons", "../lessons/pictures")
+            there = "../lessons/pictures"
+            stills = lessons.with_picture_files(deck, known, where, loading="eager")
+            stills = stills.replace('src="pictures', f'src="{there}')
+            return lessons.with_script_files(stills, where, there)
 
         write_decks(decks, self.extra / "slides", ready)
 
@@ -166,7 +164,7 @@ class Sources:
             if self.live:
                 pages.mark_problems(notebook)
                 data = json.dumps({"notebook": given, "files": files}, ensure_ascii=False)
-                _write(self.extra / LIVE / "pages" / f"{name}.json", data)
+                write(self.extra / LIVE / "pages" / f"{name}.json", data)
             self.put(f"problems/{name}.ipynb", nbformat.writes(notebook))
         self.shown["sets"] = names
 
@@ -183,11 +181,11 @@ class Sources:
                 addresses[f"package/{room}.{file.stem}"] = address
         for old, new in addresses.items():
             moved = self.rendered("moved.html.j2", page=f"{new}.html")
-            _write(self.extra / f"{old}.html", moved)
+            write(self.extra / f"{old}.html", moved)
         for path in reference.shown_code(self.root):
             code, up = reference.coloured(self.read(path)), "../" * (path.count("/") + 1)
             page = self.rendered("code.html.j2", path=path, up=up, code=code)
-            _write(self.extra / "code" / path.replace(".py", ".html"), page)
+            write(self.extra / "code" / path.replace(".py", ".html"), page)
         explorers = shutil.ignore_patterns("explorers")
         shutil.copytree(self.root / "figures", self.extra / "figures", ignore=explorers)
         files = {path.name for path in (self.root / "figures").iterdir()}
@@ -242,11 +240,6 @@ class Sources:
             self.put(page, with_citations(text, self.works, listed(text), "references.html"))
 
 
-def _write(path: Path, text: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8", newline="\n")
-
-
 def write_sources(
     root: Path, folder: Path, extra: Path, repository: str = "", pyodide: Path | None = None
 ) -> None:
@@ -268,7 +261,7 @@ def write_sources(
 def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = None) -> None:
     """Make the book of a course, in a new folder or in the folder of an older book.
 
-    `pyodide` is a folder with the files of Pyodide; if it is given, Python runs in the pages.
+    See `Sources` for `repository`, and `write_sources` for `pyodide`.
     """
     if book.exists() and not (book / MADE).exists():
         raise ValueError(f"{book} is not a book made by this command; move it away or delete it")

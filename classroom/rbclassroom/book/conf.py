@@ -45,11 +45,10 @@ def name_sections(_app: Any, doctree: Any) -> None:
                 section["ids"] = [fragment(section.children[0].astext())]
 
 
-def skip_foreign(_app: Any, _what: str, name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
-    """Omit members of other packages, and the constant ENGINE, which is JavaScript."""
+def skip_foreign(_app: Any, _what: str, _name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
+    """Omit members of other packages."""
     module = getattr(obj, "__module__", None) or "rbcourse"
-    own = module.startswith(("rbcourse", "rbclassroom"))
-    return True if name == "ENGINE" or not own else None
+    return None if module.startswith(("rbcourse", "rbclassroom")) else True
 
 
 def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str]) -> None:

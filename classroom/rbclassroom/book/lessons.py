@@ -159,14 +159,14 @@ def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
     def kept(data: str) -> tuple[str, str]:
         name = hashlib.sha256(data.encode()).hexdigest()[:16]
         text = f'(window.rbcourseStates ??= {{}})["{name}"] = {data};\n'
-        _put(folder / "pictures" / f"{name}.js", text)
+        write(folder / "pictures" / f"{name}.js", text)
         return name, f'<script src="{to}/{name}.js"></script>'
 
     def put_player(match: re.Match[str]) -> str:
         engine = (
             f"window.rbcourseDisplay ??= (() => {{\n{ENGINE}\nreturn rbcourseDisplay;\n}})();\n"
         )
-        _put(folder / "pictures" / "display.js", engine)
+        write(folder / "pictures" / "display.js", engine)
         name, tag = kept(match[2])
         start = f'<script>{match[1]}rbcourseStates["{name}"]);</script>'
         return f'<script src="{to}/display.js"></script>{tag}{start}'
@@ -178,7 +178,8 @@ def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
     return _DATA.sub(put_data, _PLAYER.sub(put_player, shown))
 
 
-def _put(path: Path, text: str) -> None:
+def write(path: Path, text: str) -> None:
+    """Write a text file with Unix line ends, and make its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")
 

@@ -4,13 +4,10 @@ import re
 import tomllib
 from pathlib import Path
 from posixpath import dirname, join, normpath, relpath
-from typing import Any
 
 from rbclassroom.course.ledger import KEY, MISPRINTS, WHAT
 
-CONTENTS: dict[str, Any] = tomllib.loads(
-    Path(__file__).with_name("contents.toml").read_text(encoding="utf-8")
-)
+CONTENTS = tomllib.loads(Path(__file__).with_name("contents.toml").read_text("utf-8"))
 PAGES: dict[str, str] = CONTENTS["pages"]
 MOVED: dict[str, str] = CONTENTS["moved"]
 CLASSROOM = "explorers", "figures", "surveys", "course", "lecture", "assignments", "live", "book"
@@ -83,18 +80,16 @@ def link(to: str, page: str, text: str) -> str:
     return f'<a href="{relpath(to, dirname(page) or ".")}">{text}</a>'
 
 
-def to_test(test: str, page: str = "ledger.md") -> str:
-    """Return a link to a test, given its name in the ledger."""
-    path, name = test.split(".py::")
-    home = "classroom/tests" if path.split("/")[0] in CLASSROOM else "tests"
-    return link(f"code/{home}/{path}.html#{name}", page, name.replace("_", "_<wbr>"))
-
-
 def to_tests(tests: list[str], page: str = "ledger.md") -> str:
-    """Return links to tests; two or more links are folded."""
-    links = "<br>".join(to_test(test, page) for test in tests)
-    more = f"<details><summary>{len(tests)} tests</summary>{links}</details>"
-    return more if len(tests) > 1 else links
+    """Return links to tests, given their names in the ledger; two or more links are folded."""
+    links = []
+    for path, name in (test.split(".py::") for test in tests):
+        home = "classroom/tests" if path.split("/")[0] in CLASSROOM else "tests"
+        to = f"code/{home}/{path}.html#{name}"
+        links.append(link(to, page, name.replace("_", "_<wbr>")))
+    shown = "<br>".join(links)
+    more = f"<details><summary>{len(tests)} tests</summary>{shown}</details>"
+    return more if len(tests) > 1 else shown
 
 
 def to_function(name: str, page: str = "ledger.md") -> str:

@@ -3,7 +3,7 @@
 import ast
 import re
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -34,29 +34,28 @@ def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
 def module(name: str, root: Path) -> dict[str, Any]:
     """Return the names, the summary and the public members of a module, with constants last."""
     tree = ast.parse((root / file_of(name)).read_text(encoding="utf-8"))
-    kinds = ast.FunctionDef | ast.ClassDef
-    public = [node.name for node in tree.body if isinstance(node, kinds) and node.name[0] != "_"]
-    members = [
-        (node.name, "class" if isinstance(node, ast.ClassDef) else "function")
-        for node in tree.body
-        if isinstance(node, kinds) and node.name in public
-    ]
-    members += [(name, "data") for name in _documented(tree)]
     about = (ast.get_docstring(tree) or "").partition("\n")[0]
-    full = full_name(name)
-    return {"name": name, "full": full, "about": about, "public": public, "members": members}
+    # the constant ENGINE is JavaScript
+    explained = {node for node, after in pairwise(tree.body) if isinstance(after, ast.Expr)}
+    members = [
+        (each, kind)
+        for each, kind, node in _definitions(tree)
+        if each[0] != "_" and (kind != "data" or (node in explained and each != "ENGINE"))
+    ]
+    members.sort(key=lambda member: member[1] == "data")
+    return {"name": name, "full": full_name(name), "about": about, "members": members}
 
 
-def _documented(tree: ast.Module) -> list[str]:
-    found = []
-    for node, after in pairwise(tree.body):
-        match node, after:
-            case (
-                ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)),
-                ast.Expr(value=ast.Constant(value=str())),
-            ) if name[0] != "_" and name != "ENGINE":
-                found.append(name)
-    return found
+def _definitions(tree: ast.Module) -> Iterator[tuple[str, str, ast.stmt]]:
+    """Yield the name, the kind and the statement of each definition in a module."""
+    for node in tree.body:
+        match node:
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+                yield name, "function", node
+            case ast.ClassDef(name=name):
+                yield name, "class", node
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                yield name, "data", node
 
 
 def shown_code(root: Path) -> list[str]:
@@ -76,16 +75,8 @@ def coloured(source: str) -> str:
         for found, text in PythonLexer(stripnl=False).get_tokens(source)
     )
     lines = formatted(tokens, HtmlFormatter(nowrap=True)).split("\n")
-    for node in ast.parse(source).body:
-        match node:
-            case (
-                ast.FunctionDef(name=name)
-                | ast.AsyncFunctionDef(name=name)
-                | ast.ClassDef(name=name)
-                | ast.Assign(targets=[ast.Name(id=name)])
-                | ast.AnnAssign(target=ast.Name(id=name))
-            ):
-                lines[node.lineno - 1] = f'<a id="{name}"></a>{lines[node.lineno - 1]}'
+    for name, _, node in _definitions(ast.parse(source)):
+        lines[node.lineno - 1] = f'<a id="{name}"></a>{lines[node.lineno - 1]}'
     return "\n".join(lines)
 
 
@@ -101,10 +92,10 @@ def naming(root: Path) -> dict[str, list[str]]:
         for name, target in _imported(ast.parse(init.read_text(encoding="utf-8"))).items():
             exported[f"{room}.{name}"] = target
     for file in shown_code(root):
-        home, _, path = file.rpartition("tests/")
+        path = file.rpartition("tests/")[2]
         tree = ast.parse((root / file).read_text(encoding="utf-8"))
         known = _imported(tree)
-        for test in tree.body if home in ("", "classroom/") else ():
+        for test in tree.body:
             if isinstance(test, ast.FunctionDef) and test.name.startswith("test_"):
                 nodes = (x for x in ast.walk(test) if isinstance(x, ast.Name | ast.Attribute))
                 read = (ast.unparse(node).partition(".") for node in nodes)

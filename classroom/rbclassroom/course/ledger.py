@@ -7,7 +7,6 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import nbformat
 
@@ -19,9 +18,7 @@ KEY = re.compile(
     r"(?!\w|\.\d)",
     re.ASCII,
 )
-SOURCES: dict[str, Any] = tomllib.loads(
-    Path(__file__).with_name("sources.toml").read_text(encoding="utf-8")
-)
+SOURCES = tomllib.loads(Path(__file__).with_name("sources.toml").read_text("utf-8"))
 MISPRINTS = {f"errata {i}": row for i, row in enumerate(SOURCES["misprints"], start=1)}
 WHAT: dict[str, str] = SOURCES["entries"] | SOURCES["beyond"]
 """The description of each entry, of the texts and beyond them."""

@@ -8,7 +8,7 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from itertools import count
 from pathlib import Path
@@ -220,7 +220,8 @@ def copy_lessons(lessons: Path, work: Path) -> None:
             notebook.metadata.update(OPENED)
             copy = (nbformat.writes(notebook) + "\n").encode()
             if not _left_alone(target, copy, last):
-                target = next(p for p in _numbered(target) if not p.exists())
+                others = (target.with_stem(f"{path.stem}_{number}") for number in count(2))
+                target = next(other for other in others if not other.exists())
                 print(f"{path.name} has changed; your copy is kept, the new one is {target.name}")
             target.write_bytes(copy)
             try:
@@ -275,7 +276,3 @@ def _sources(notebook: Any) -> list[tuple[str, str]]:
 
 def _tags(notebook: Any) -> list[Any]:
     return [cell.metadata.get("tags", []) for cell in notebook.cells]
-
-
-def _numbered(path: Path) -> Iterator[Path]:
-    return (path.with_stem(f"{path.stem}_{number}") for number in count(2))

@@ -9,7 +9,11 @@ from nbformat import NotebookNode
 
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test
 
-LEFT_OUT = tomllib.loads(Path(__file__).with_name("left_out.toml").read_text("utf-8"))
+_REASONS = tomllib.loads(Path(__file__).with_name("left_out.toml").read_text("utf-8"))
+LEFT_OUT = {
+    lesson: {cell: why for why, cells in reasons.items() for cell in cells}
+    for lesson, reasons in _REASONS.items()
+}
 """The cells of each lesson that cannot be run in a page, with the reasons."""
 _IN_PAGES = {  # sentences about Jupyter, and the sentences that replace them
     r"Each answer is followed by a test\. Run the test, and it tells you": "*Check*, below each "

@@ -11,8 +11,7 @@ addEventListener("DOMContentLoaded", () => {
     let chosen = rows.filter(({ cells }) => cells[0] === phrase);
     if (!chosen.length) chosen = rows.filter(({ cells }) => cells.some((cell) => cell.includes(phrase)));
     if (!chosen.length) chosen = rows.filter(({ text }) => words.every((word) => text.includes(word)));
-    for (const { row } of rows) row.hidden = true;
-    for (const { row } of chosen) row.hidden = false;
+    for (const each of rows) each.row.hidden = !chosen.includes(each);
     for (const section of sections) section.hidden = !section.querySelector("tbody tr:not([hidden])");
     found.textContent = phrase ? `${chosen.length} of ${rows.length} rows` : "";
   };
