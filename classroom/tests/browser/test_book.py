@@ -38,6 +38,7 @@ class Page(HTMLParser):
         text = (BOOK / name).read_text("utf-8")
         self.formulas, self._apart = [], []
         self.faults = [] if re.search(r"<title>\s*[^\s<]", text) else ["no title"]
+        self.faults += ["the path of this machine"] * (str(ROOT) in text)
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
