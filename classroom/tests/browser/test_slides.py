@@ -94,8 +94,8 @@ def until(page, selector, key="PageDown"):
 
 def test_a_remote_control_goes_through_all_steps(deck):
     seen, steps = [], 0
-    until(deck, ":has(figure input)")
-    slider = deck.locator("section.present > section.present figure input").first
+    until(deck, ":has(.panel input)")
+    slider = deck.locator("section.present > section.present .panel input").first
     slider.focus()
     at = slider.input_value()
     here = deck.evaluate(HERE)
@@ -103,7 +103,7 @@ def test_a_remote_control_goes_through_all_steps(deck):
     assert slider.input_value() != at
     assert deck.evaluate(HERE).partition("\n")[0] == here.partition("\n")[0]
     deck.keyboard.press("PageDown")
-    assert deck.locator("section.present > section.present figure input").count() == 0
+    assert deck.locator("section.present > section.present .panel input").count() == 0
     deck.keyboard.press("Shift+ArrowLeft")
     while not deck.evaluate("Reveal.getCurrentSlide().matches('.end')"):
         seen.append(deck.evaluate("Reveal.getCurrentSlide().className"))
@@ -145,21 +145,21 @@ def test_the_dark_scheme_is_never_automatic(context):
         ):
             expect(help_).to_contain_text(words)
         page.keyboard.press("Escape")
-        until(page, ":has(figure input)")
-        table = page.locator("section.present > section.present figure table")
+        until(page, ":has(.panel input)")
+        table = page.locator("section.present > section.present .panel table")
         expect(table).to_be_hidden()
         page.keyboard.press("r")
         expect(table).to_be_visible()
         page.keyboard.press("r")
-        time = page.locator("section.present > section.present figure input").last
+        time = page.locator("section.present > section.present .panel input").last
         before = time.input_value()
         page.keyboard.press("m")
         page.wait_for_function(
-            f"Reveal.getCurrentSlide().querySelectorAll('figure input')[1].value !== '{before}'"
+            f"Reveal.getCurrentSlide().querySelectorAll('.panel input')[1].value !== '{before}'"
         )
         page.keyboard.press("m")
         until(page, ".verdict")
-        until(page, ":has(figure input)", "PageUp")
+        until(page, ":has(.panel input)", "PageUp")
         expect(table).to_be_visible()  # the vote is over, so the table is shown
 
 

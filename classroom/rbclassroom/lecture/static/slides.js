@@ -14,13 +14,16 @@ const fit = (figure) => {
     sketch.setAttribute("viewBox", `0 ${y - 10} 640 ${height + 20}`);
     sketch.style.aspectRatio = `640 / ${height + 20}`;
   }
-  const seen = figure.querySelector(":scope > :is(canvas, img)"), panel = figure.querySelector(":scope > div");
+  const seen = figure.querySelector(":scope > :is(canvas, img)"), body = figure.closest(".body");
   if (!seen || !figure.clientWidth) return;
+  const numbers = body.querySelector(".panel > div:not(:has(> input))"); // they stand below the picture if they need the room
+  if (numbers && body.querySelector(".words").offsetHeight > body.clientHeight) figure.append(numbers);
+  const below = all(":scope > div", figure).reduce((sum, { offsetHeight }) => sum + offsetHeight, 0);
   const crop = figure.dataset.crop ?? seen.dataset.crop ?? "";
   figure.dataset.crop = crop;
   const [left, top, right, bottom] = (crop || "0 0 0 0").split(" ").map(Number);
   const ratio = +figure.dataset.ratio || seen.naturalWidth / seen.naturalHeight;
-  const height = figure.clientHeight - (panel && !crop ? panel.offsetHeight + 10 : 0);
+  const height = figure.clientHeight - (below && !crop ? below + 10 : 0);
   const room = Math.min(figure.clientWidth / (1 - left - right), (height * ratio) / (1 - top - bottom));
   const width = Math.floor(room), high = width / ratio;
   figure.style.setProperty("--w", `${width}px`);
@@ -64,8 +67,14 @@ const revive = async (section) => {
     for (const each of all("script", figure)) each.remove();
     figure.dataset.ratio = data.size[0] / data.size[1];
     await rbcourseDisplay.revive(image, data);
+    if (section.matches(".split")) { // sliders and numbers stand below the text, so that the picture is large
+      const panel = Object.assign(document.createElement("div"), { className: "panel" });
+      panel.append(...all(":scope > div > div:is(:has(> input), :last-child)", figure));
+      section.querySelector(".words").append(panel);
+      new ResizeObserver(() => fit(figure)).observe(panel); // the numbers come later
+    }
     const asked = section.parentElement.querySelector(".title, .poll") && !section.dataset.told;
-    figure.classList.toggle("quiet", Boolean(data.controls.length > 1 && asked));
+    section.classList.toggle("quiet", Boolean(data.controls.length > 1 && asked));
     fit(figure);
   }
 };
@@ -76,11 +85,11 @@ const keys = {
     const end = all(".slides > section").length - 1, { h, v } = Reveal.getIndices();
     Reveal.slide(end, h === end && v === 0 ? 1 : 0);
   }],
-  M: ["Move: play or pause a picture", () => Reveal.getCurrentSlide().querySelector("figure [aria-label='play or pause']")?.click()],
-  R: ["Readouts of a picture: show or hide", () => all("figure:has(input)", Reveal.getCurrentSlide()).forEach((figure) => {
-    figure.classList.toggle("quiet");
-    fit(figure);
-  })],
+  M: ["Move: play or pause a picture", () => Reveal.getCurrentSlide().querySelector("[aria-label='play or pause']")?.click()],
+  R: ["Readouts of a picture: show or hide", () => {
+    Reveal.getCurrentSlide().classList.toggle("quiet");
+    all("figure", Reveal.getCurrentSlide()).forEach(fit);
+  }],
   T: ["Open or close a vote", () => {
     if (window !== window.top) return window.top.opener?.Reveal.triggerKey(84); // in the speaker view
     const section = Reveal.getCurrentSlide(), poll = section.dataset.poll;
@@ -124,8 +133,10 @@ const show = ({ currentSlide }) => {
   if (printing) return;
   if (currentSlide.matches(".verdict")) { // show readouts from now on
     const before = all("section", currentSlide.parentElement);
-    for (const section of before) section.dataset.told = "yes";
-    for (const figure of before.flatMap((section) => all("figure.quiet", section))) figure.classList.remove("quiet");
+    for (const section of before) {
+      section.dataset.told = "yes";
+      section.classList.remove("quiet");
+    }
   }
   all("figure", currentSlide).forEach(fit);
   revive(currentSlide).then(() => revive(sections[sections.indexOf(currentSlide) + 1]));
@@ -151,7 +162,7 @@ const begin = async () => {
     progress: false, controls: false, hash: true, slideNumber: numbered, navigationMode: "linear",
     transition: "none", backgroundTransition: "none", pdfSeparateFragments: false, pdfMaxPagesPerSlide: 1,
     totalTime: 50 * 60, plugins: [RevealNotes],
-    keyboardCondition: (event) => !event?.target?.closest?.("figure"), // a slider uses keys itself
+    keyboardCondition: (event) => !event?.target?.closest?.("figure, .panel"), // a slider uses keys itself
   });
   for (const [key, [description, act]] of Object.entries(keys)) {
     Reveal.addKeyBinding({ keyCode: key.charCodeAt(0), key, description }, act);
@@ -164,7 +175,7 @@ const begin = async () => {
   // A remote control changes slides even after a slider was moved. Some keyboards have "?" on another key.
   addEventListener("keydown", (event) => {
     const act = { PageDown: "next", PageUp: "prev", "?": "toggleHelp" }[event.key];
-    if (!act || (event.key !== "?" && !event.target.closest?.("figure"))) return;
+    if (!act || (event.key !== "?" && !event.target.closest?.("figure, .panel"))) return;
     event.preventDefault();
     event.stopPropagation();
     Reveal[act]();
