@@ -124,6 +124,7 @@ def deck_page(deck: Deck) -> str:
     stacks = [part for part in parts if part] + [[*end, *deck.behind]]
     joined = ("".join(map(section, part)) for part in stacks)
     slides = "\n".join(f"<section>{part}</section>" for part in joined)
+    slides = slides.replace("<h1>", f'<p class="lesson">Lesson {deck.number}</p><h1>', 1)
     template = (STATIC / "deck.html").read_text(encoding="utf-8")
     return template.replace("<!--TITLE-->", html.escape(deck.title)).replace(
         "<!--SLIDES-->", slides

@@ -7,7 +7,7 @@ CONTRIBUTING.md has the rules for authors.
 import base64
 import io
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import nbformat
@@ -80,6 +80,7 @@ class Deck:
     sections: list[list[Slide]]
     behind: list[Slide]
     sheet: str
+    number: str = ""
 
     @property
     def shown(self) -> list[Slide]:
@@ -166,7 +167,11 @@ class _Reader:
         self.keys, self.section = {"homework"}, ""
         self.sections.append([])
         self.note("E leads to exercises, misprints and references, after this slide.", ahead=True)
-        self.put(Slide("Questions?", "end", self.sections[0][0].parts))
+        title = self.sections[0][0]
+        still = title.picture and replace(
+            title.picture, html=title.picture.html.partition("<script")[0]
+        )
+        self.put(Slide("Questions?", "end", title.parts, still))
         plan(deck.shown, sheet)
         return deck
 
@@ -401,6 +406,8 @@ def deck_of(path: Path) -> Deck:
     """Return the slides of a lesson in the folder ``notebooks`` of a course."""
     try:
         notebook = nbformat.read(path, as_version=4)
-        return _Reader(path.resolve().parents[1]).read(notebook)
+        deck = _Reader(path.resolve().parents[1]).read(notebook)
     except ValueError as error:
         raise ValueError(f"{path.name}: {error}") from error
+    deck.number = str(int(path.name[:2]))
+    return deck

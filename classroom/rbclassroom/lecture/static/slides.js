@@ -51,7 +51,16 @@ const settle = (section) => {
   const wide = () => all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
   const over = () => words.offsetHeight > room || wide();
   const sizes = section.matches(".plain") ? [56, 46, 42, 39, 36] : section.matches(".poll, .verdict") ? [48, 44, 40, 36] : [45, 42, 39, 36];
-  do set(sizes.shift()); while (over() && sizes.length);
+  const trials = sizes.flatMap((size) => [[size, ""], [size, "18px"]]); // gaps shrink before text
+  do {
+    const [size, gap] = trials.shift();
+    words.style.gap = gap;
+    set(size);
+  } while (over() && trials.length);
+  section.classList.add("settled");
+  for (const options of all(".options", section)) { // boxes grow into the free room
+    options.style.minHeight = `${Math.min(room - words.offsetHeight + options.offsetHeight, 165 * options.children.length)}px`;
+  }
   for (const [, option, idea] of section.matches(".poll") ? all(".option", section).map((row) => row.children) : []) {
     option.style.top = `${idea.offsetHeight / 2 + 2}px`; // in the middle of its box, as the idea is hidden
   }
