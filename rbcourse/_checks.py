@@ -224,7 +224,7 @@ def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
 
 
 def check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -> None:
-    """Raise a ValueError that names the first entry that does not pass, and what is wanted."""
+    """Raise a ValueError that names the first entry that does not pass, and the wanted values."""
     if not passes.all():
         value = array[~passes][0]
         raise ValueError(f"{first_index(name, ~passes)} is {value}, {wanted} is wanted")
