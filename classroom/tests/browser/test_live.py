@@ -181,9 +181,9 @@ def test_nothing_is_loaded_before_the_reader_acts(page, address):
 
 
 def test_a_changed_cell_can_be_stopped_and_reset(page, address):
-    opened(page, address, "lessons/10_rigid_body_motion.html")
+    opened(page, address, "lessons/06_geodesics.html")
     page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
-    part = page.locator(".tag_try-cell-16")
+    part = page.locator(".tag_try-cell-04")
     before = part.locator(".cell_output").get_by_role("button").count()
     part.get_by_role("button", name="Try it").click()
     expect(part.locator(".outputs figure canvas")).to_be_visible()  # this picture can be turned
