@@ -44,7 +44,7 @@ const settle = (section) => {
     const parent = box.parentElement, { paddingLeft, paddingRight } = getComputedStyle(parent);
     const width = box.querySelector("svg").getBoundingClientRect().width;
     const room = parent.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
-    if (width > room) box.style.fontSize = `${Math.max(62, Math.floor((98 * room) / width))}%`;
+    if (width > room + 1) box.style.fontSize = `${Math.max(62, Math.floor((98 * room) / width))}%`;
   });
   const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
@@ -57,7 +57,6 @@ const settle = (section) => {
     words.style.gap = gap;
     set(size);
   } while (over() && trials.length);
-  section.classList.add("settled");
   for (const options of all(".options", section)) { // boxes grow into the free room
     options.style.minHeight = `${Math.min(room - words.offsetHeight + options.offsetHeight, 165 * options.children.length)}px`;
   }
