@@ -116,8 +116,7 @@ def set_up(environment):
         print("Installing", ", ".join(LISTS[name] for name in missing), end=" ", flush=True)
         install(*[word for name in missing for word in ("-r", LISTS[name])])
         if "lessons" in missing:
-            # the first import of Matplotlib searches for fonts
-            patiently(python(), "-c", "import matplotlib.pyplot")
+            patiently(python(), "-c", "import matplotlib.pyplot")  # it searches for fonts once
         write_stamp(dict(found, **{name: wanted[name] for name in missing}))
         print(" done.", flush=True)
 
@@ -141,8 +140,7 @@ def create(found):
     except OSError as error:
         sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
     VENV.mkdir()
-    # if this run is interrupted, the next run finds this stamp
-    write_stamp({"unfinished": True})
+    write_stamp({"unfinished": True})  # for the next run, if this run is interrupted
     print("Making .venv", end=" ", flush=True)
     if UV:
         how = "--seed", "--allow-existing", "--python", sys.executable
@@ -177,8 +175,7 @@ def settings_of_pip(*pip):
         "cert": "SSL_CERT_FILE",
     }
     listed = subprocess.run(pip + ("config", "list"), stdout=subprocess.PIPE, text=True).stdout
-    # uv then treats all indexes alike, as pip does
-    settings = {"UV_INDEX_STRATEGY": "unsafe-best-match"}
+    settings = {"UV_INDEX_STRATEGY": "unsafe-best-match"}  # all indexes are alike, as for pip
     for key, _, value in (line.partition("=") for line in listed.splitlines()):
         name = names.get(key.rpartition(".")[2])
         if name:
