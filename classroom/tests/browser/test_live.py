@@ -125,7 +125,10 @@ def test_at_least_250_cells_can_be_run():
     assert sum(len(re.findall(r"\btag_try-", page)) for page in pages) >= 250
 
 
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(x, marks=[pytest.mark.slow] * (x in ("ps2", "ps3"))) for x in SETS],
+)
 def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
     setup = cells(name)["setup"].source, TABLES[name]["helpers"]
     answers = {key: cell.source for key, cell in cells(name).items() if key.endswith("-answer")}
