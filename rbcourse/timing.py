@@ -162,7 +162,7 @@ def fastest(
         x = _two_passes(s, _ellipses(np.diff(s), rows, near), caps, ends**2 * moving, moving)
         timed = Timed(duration=np.array(1.0), curve=path, s=s, rate=np.sqrt(x))
         timed = replace(timed, duration=np.array(timed.times[-1]))
-        most, when = max(_shares(timed, rows_of, 5001).values())
+        most, when = max(_shares(timed, rows_of, 1001).values())
         if most <= 1 + TOLERANCE:
             return timed
     what = f"a limit is exceeded by {most - 1:.1e} near s = {timed.progress(when)[0]:.6g}"
@@ -365,11 +365,14 @@ def _two_passes(s: Array, Q: Array, caps: Array, ends: Array, moving: Array) -> 
     """Return x on the grid; `ends` are the values of x at both ends, if the path moves there."""
     A, B, C, D, E, F = Q
     tops, cap, N = _tops(Q, caps).tolist(), caps.tolist(), len(s) - 1
-    there, back, least = (
-        np.stack(some).transpose(1, 2, 0).tolist()
-        for some in ((A, B, C, D, E, F), (C, B, A, E, D, F), (A, -B, C, -D, E, F))
-    )
+
+    def listed(*rows: Array) -> list[list[list[float]]]:
+        cells: list[list[list[float]]] = np.stack(rows).transpose(1, 2, 0).tolist()
+        return cells
+
     first, last = ends.tolist()
+    there, back = listed(A, B, C, D, E, F), listed(C, B, A, E, D, F)
+    least = listed(A, -B, C, -D, E, F) if last > 0 else []
     low, high = [0.0] * N + [last], [inf] * N + [last if moving[1] else cap[N]]
     for i in range(N - 1, -1, -1):  # find the largest x from which the end can be reached
         high[i] = min(_largest(there[i], max(min(high[i + 1], tops[i]), low[i + 1])), cap[i])
