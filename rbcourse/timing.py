@@ -356,7 +356,7 @@ def _sampled(path: Curve, finer: int) -> tuple[Array, ...]:
     corners[1:-1] |= (jumps > 1e-9 * sizes(V).max(axis=(0, 1, 2))).any(axis=-1)
     caps[::n][corners] = 0
     near = np.zeros((L, n, 1), bool)
-    near[rest[0].any(axis=-1), : n // 25] = near[rest[1].any(axis=-1), -n // 25 :] = True
+    near[rest[0].any(axis=-1), : n // 25] = near[rest[1].any(axis=-1), -(n // 25) :] = True
     V, A, R = (x.reshape(len(x), L * n, *x.shape[3:]) for x in (V, A, R))
     return np.append(t[0], knots[-1]), V, A, R, caps, near.reshape(-1, 1)
 

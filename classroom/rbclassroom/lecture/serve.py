@@ -53,7 +53,7 @@ class Slides(_Here, StaticFileHandler):
     """The handler of the files of the slides."""
 
 
-class Hold(RequestHandler):
+class Hold(_Here):
     """The handler of an image that a page requests, and drops when its slides are laid out.
 
     A browser prints a page when all of its images are loaded or dropped.

@@ -78,6 +78,7 @@ def test_slides_show_only_the_text_written_for_them(tmp_path):
     assert deck.shown[3].notes == ["Nothing here.", "Text."]
     assert deck.shown[0].notes[0].endswith("Goals.")
     page = pages.deck_page(deck).replace("\N{NO-BREAK SPACE}", " ")
+    assert "Lesson 1</p><h1>" in page
     assert "<p>Short.</p>" in page
     assert '<div class="fragment"><p>Then.</p>' in page
     assert "<li>all of it</li>" in page
