@@ -110,8 +110,7 @@ class Sources:
             figures += lessons.figures_of(path.name, notebook)
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
-            picture = decks[path.stem].sections[0][0].picture
-            lead = picture.html.partition("<script")[0] if picture else ""
+            lead = decks[path.stem].shown[0].picture.partition("<script")[0]
             sheet = lessons.prepared(notebook, path.name, self.root, known, where, lead)
             lessons.add_buttons(notebook, path.name, self.repository)
             if self.live:

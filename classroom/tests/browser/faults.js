@@ -1,6 +1,6 @@
-// Return two lists: faults such as cut parts or small text, and the page numbers of slides with little text.
+// Return faults such as cut parts or small text, the page numbers of slides with little text, and the widths of pictures.
 async () => {
-  const faults = [], thin = [], sections = [...document.querySelectorAll(".slides section section")];
+  const faults = [], thin = [], widths = {}, sections = [...document.querySelectorAll(".slides section section")];
   const frame = () => new Promise(requestAnimationFrame);
   for (const [number, section] of sections.entries()) {
     const { h, v } = Reveal.getIndices(section), scale = Reveal.getScale();
@@ -19,11 +19,12 @@ async () => {
     const heading = section.querySelector("h3");
     if (heading && box(heading).height > 160 * scale) say(`heading of more than two lines: ${heading.textContent}`);
     const cut = () => [...section.querySelectorAll("figure > :is(img, canvas), figure > div > div:not(.rbcourse-view)")].filter((part) => {
-      const { left, right, bottom } = box(part), margin = part.parentElement.dataset.crop ? 1e9 : 3 * scale;
+      const { left, right, bottom } = box(part), margin = /[1-9]/.test(part.parentElement.dataset.crop) ? 1e9 : 3 * scale;
       return seen(part) && (left < sheet.left - margin || right > sheet.right + margin || bottom > sheet.bottom + margin);
     });
     for (let wait = 0; wait < 120 && cut().length; wait++) await frame();  // an interactive picture gets its size late
     for (const part of cut()) say(`picture cut: ${part.tagName}`);
+    widths[number + 1] = section.querySelector("figure > :is(img, canvas)")?.offsetWidth;
     const texts = document.createTreeWalker(section, NodeFilter.SHOW_TEXT);
     while (texts.nextNode()) {
       const part = texts.currentNode.parentElement, apart = "aside, script, sup, sub, mjx-container, .rbcourse-view, [role=status]";
@@ -36,5 +37,5 @@ async () => {
     const height = Math.max(...boxes.map(({ bottom }) => bottom)) - Math.min(...boxes.map(({ top }) => top));
     if (height < sheet.height / 4 && !section.querySelector("figure") && !section.matches(".title, .end")) thin.push(number + 1);
   }
-  return [faults, thin];
+  return [faults, thin, widths];
 }

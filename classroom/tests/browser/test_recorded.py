@@ -116,6 +116,7 @@ def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
 def test_players_show_few_steps_if_the_user_asks_for_less_motion(timed):
     timed.emulate_media(reduced_motion="reduce")
     timed.goto((FOLDER / "theta.html").as_uri())
+    timed.locator("input").last.fill("0")
     timed.clock.pause_at(HOUR)
     timed.get_by_role("button", name="play or pause").click()
     for step in (20, 40, 60, 80):

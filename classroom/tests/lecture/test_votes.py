@@ -15,9 +15,9 @@ from tiny import ask, lecture, lesson_at
 
 pytest.importorskip("segno", reason="slides are made in the environment of the book")
 
-from rbclassroom.lecture import serve as module
-from rbclassroom.lecture.serve import find_lesson, main, open_votes
-from rbclassroom.lecture.votes import Ballot, find_address
+from rbclassroom.lecture import votes as module
+from rbclassroom.lecture.serve import find_lesson, main
+from rbclassroom.lecture.votes import Ballot, find_address, open_votes
 
 OPTIONS = ["one", "two <b>2</b>", "three", "four"]
 
@@ -36,31 +36,16 @@ def test_a_lesson_is_found_by_its_number(tmp_path, monkeypatch):
 
 def test_votes_are_counted_when_the_vote_is_closed():
     ballot = Ballot()
-    for options in (["one"], ["some"] * 27):
-        with pytest.raises(ValueError, match="2 to 26"):
-            ballot.begin("Poll 1", options)
     ballot.begin("Poll 1", OPTIONS)
     key = ballot.key
-    with pytest.raises(ValueError, match="Poll 1 is open"):
-        ballot.begin("Poll 2", OPTIONS)
-    phones = a, b, c, silent, *_ = [ballot.admit() for _ in range(500)]
-    with pytest.raises(ValueError, match="500 phones"):
-        ballot.admit()
-    for phone, letter in [(a, "A"), (b, "C"), (a, "C"), (c, "D")]:
-        ballot.vote(phone, letter)
-    for letter in ("E", "a", "", "AB", "1"):
-        with pytest.raises(ValueError, match="The options are A, B, C, D"):
-            ballot.vote(b, letter)
-    assert [ballot.vote_of(phone) for phone in (a, silent)] == ["C", ""]
+    ballot.votes |= {"a": "C", "b": "C", "c": "D", "silent": ""}
+    ballot.begin("Poll 2", OPTIONS)  # a vote is open, and remains open
     assert ballot.state() == {"poll": "Poll 1", "open": True, "voters": 3, "counts": []}
     for _ in range(2):  # closing the vote again changes nothing
         ballot.close()
         counted = {"poll": "Poll 1", "open": False, "voters": 3, "counts": [0, 0, 2, 1]}
         assert ballot.state() == counted
-    assert not any(phone in repr(vars(ballot)) or ballot.knows(phone) for phone in phones)
-    for stranger in ("", "a", a):
-        with pytest.raises(ValueError, match="not admitted"):
-            ballot.vote(stranger, "A")
+    assert ballot.votes == {}
     ballot.begin("Poll 1", OPTIONS)
     assert ballot.key != key
     assert ballot.state()["voters"] == 0
@@ -76,13 +61,13 @@ def test_an_address_of_another_machine_is_refused(address):
         open_votes(address)
 
 
-def test_the_class_votes_by_hand_without_a_network(monkeypatch, capsys):
+def test_phones_cannot_vote_without_a_network(monkeypatch):
     def nowhere():
         raise OSError("Network is unreachable")
 
     monkeypatch.setattr(module, "find_address", nowhere)
-    assert open_votes("") is None
-    assert "show of hands" in capsys.readouterr().out
+    with pytest.raises(ValueError, match=r"this machine, which has no network: .*unreachable"):
+        open_votes("")
 
 
 def test_the_detected_address_belongs_to_this_machine():
@@ -139,7 +124,7 @@ def test_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
             assert ask(target, Host="evil.example")[0] == 403
         assert ask(url + "/votes")[0] == 404
         assert state(begin)["open"]
-        assert state(begin) == 409
+        assert ask(url + "/state")[1] != ""
         letters = ["BA", "DA", *"CCCCCBBBBDDDAAAAAAAAAABCBCBC", "AB"]
         with ThreadPoolExecutor(30) as phones:
             pages, cookies = zip(*phones.map(vote, [url] * len(letters), letters), strict=True)
@@ -147,8 +132,9 @@ def test_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
         assert not any(re.search(r"\b\d+ votes?\b|<meter", page) for page in pages)
         assert ask(url, "POST", late, **FORM)[0] == 303  # no phone with this cookie was admitted
         assert ask(url, "POST", late, **FORM, Cookie="vote-1=a")[0] == 303
-        assert ask(url, "POST", "choice=E", **FORM, Cookie=cookies[0])[0] == 400
-        now = state()
+        assert ask(url, "POST", "choice=E", **FORM, Cookie=cookies[0])[0] == 303
+        assert f"You voted {letters[0][-1]}." in ask(url, Cookie=cookies[0])[1]
+        now = state({"poll": "Poll 2", "options": OPTIONS})  # the vote on poll 1 remains open
         assert now["address"] == url
         assert now["code"].startswith("<svg")
         assert (now["open"], now["voters"], now["counts"]) == (True, len(letters), [])
@@ -161,8 +147,10 @@ def test_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
         assert values == [(str(len(letters)), str(counts[letter])) for letter in "ABCD"]
         assert ask(url, "POST", late, **FORM, Cookie=cookies[0])[0] == 303  # the vote is closed
         assert state() == closed
+        assert ask(url + "/state")[1] == ""
         state(begin)
         assert "Tap your answer" in ask(url, Cookie=cookies[0])[1]  # this is another vote
+        assert [ask(url)[0] for _ in range(500)].count(503) == 1
         with socket.create_connection(("127.0.0.1", urlsplit(url).port)):
             end = signal.SIGTERM if sys.platform == "win32" else signal.SIGINT
             server.send_signal(end)

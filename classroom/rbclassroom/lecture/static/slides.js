@@ -5,86 +5,71 @@ const printing = /[?&](print-pdf|view=print)/.test(location.search);
 const hold = /[?&]hold/.test(location.search) && Object.assign(new Image(), { src: "hold" }); // see serve.py
 const voting = /[?&]token=/.test(location.search) && window === window.top;
 const sections = all(".slides section section");
+Object.defineProperty(window, "pixels", { get: () => window.devicePixelRatio * Reveal.getScale() }); // for display.js
 
 // Enlarge a picture with its controls as far as its place allows, and cut off white margins.
 const fit = (figure) => {
-  const sketch = figure.querySelector(":scope > svg");
-  if (sketch) { // without the empty parts above and below the drawing
-    const { y, height } = sketch.getBBox();
-    sketch.setAttribute("viewBox", `0 ${y - 10} 640 ${height + 20}`);
-    sketch.style.aspectRatio = `640 / ${height + 20}`;
-  }
   const seen = figure.querySelector(":scope > :is(canvas, img)"), body = figure.closest(".body");
   if (!seen || !figure.clientWidth) return;
   const numbers = body.querySelector(".panel > div:not(:has(> input))"); // they stand below the picture if they need the room
   if (numbers && body.querySelector(".words").offsetHeight > body.clientHeight) figure.append(numbers);
   const below = all(":scope > div", figure).reduce((sum, { offsetHeight }) => sum + offsetHeight, 0);
-  const crop = figure.dataset.crop ?? seen.dataset.crop ?? "";
-  figure.dataset.crop = crop;
-  const [left, top, right, bottom] = (crop || "0 0 0 0").split(" ").map(Number);
+  figure.dataset.crop ??= seen.dataset.crop;
+  const [left, top, right, bottom] = figure.dataset.crop.split(" ").map(Number);
   const ratio = +figure.dataset.ratio || seen.naturalWidth / seen.naturalHeight;
-  const height = figure.clientHeight - (below && !crop ? below + 10 : 0);
+  const height = figure.clientHeight - (below && below + 10);
   const room = Math.min(figure.clientWidth / (1 - left - right), (height * ratio) / (1 - top - bottom));
   const width = Math.floor(room), high = width / ratio;
   figure.style.setProperty("--w", `${width}px`);
-  if (!crop) return;
   const sides = [top * high, right * width, bottom * high, left * width].map((side) => `${side}px`);
   seen.style.margin = sides.map((side) => `-${side}`).join(" ");
   seen.style.clipPath = `inset(${sides.join(" ")} round 14px)`;
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene that turns needs its margins
 };
 
-// Text has the largest size that fits. The last size is 36 pixels.
+// Text has the largest size that fits, of 50 (46 beside pictures) to 36 pixels. Gaps shrink before text.
 // A formula that is wider than its column shrinks, but not below 62 %.
 const settle = (section) => {
-  const body = section.querySelector(".body"), words = section.querySelector(".words");
-  const formulas = all("mjx-container[display=true]", section);
-  const shrink = () => formulas.forEach((box) => {
-    box.style.fontSize = "";
-    const parent = box.parentElement, { paddingLeft, paddingRight } = getComputedStyle(parent);
-    const width = box.querySelector("svg").getBoundingClientRect().width;
-    const room = parent.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
-    if (width > room + 1) box.style.fontSize = `${Math.max(62, Math.floor((98 * room) / width))}%`;
-  });
-  const set = (size) => { section.style.fontSize = `${size}px`; shrink(); };
-  const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop);
-  const wide = () => all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
-  const over = () => words.offsetHeight > room || wide();
-  const sizes = section.matches(".plain") ? [56, 46, 42, 39, 36] : section.matches(".poll, .verdict") ? [48, 44, 40, 36] : [45, 42, 39, 36];
-  const trials = sizes.flatMap((size) => [[size, ""], [size, "18px"]]); // gaps shrink before text
+  const body = section.querySelector(".body"), words = section.querySelector(".words"), plain = section.matches(".plain");
+  const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop), largest = plain ? 50 : 46;
+  const gaps = words.children.length + all("li", words).length, space = (more) => words.style.setProperty("--more", `${more}px`);
+  const over = () => words.offsetHeight > room || all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
+  let trial = 0, more = 0;
   do {
-    const [size, gap] = trials.shift();
-    words.style.gap = gap;
-    set(size);
-  } while (over() && trials.length);
-  for (const options of all(".options", section)) { // boxes grow into the free room
-    options.style.minHeight = `${Math.min(room - words.offsetHeight + options.offsetHeight, 165 * options.children.length)}px`;
+    more = trial % 2 ? -16 : 0;
+    space(more);
+    section.style.fontSize = `${largest - 2 * Math.floor(trial / 2)}px`;
+    for (const box of all("mjx-container[display=true]", section)) {
+      box.style.fontSize = "";
+      const parent = box.parentElement, column = parent.clientWidth - 2 * parseFloat(getComputedStyle(parent).paddingLeft);
+      const width = box.querySelector("svg").getBoundingClientRect().width;
+      if (width > column + 1) box.style.fontSize = `${Math.max(62, Math.floor((98 * column) / width))}%`;
+    }
+  } while (over() && ++trial < largest - 34);
+  if (plain) space(Math.min(14, more + Math.max(0, (room - words.offsetHeight) / (2 * gaps)))); // gaps grow into the free room
+  const rows = all(".option", section), high = rows[0]?.offsetHeight;
+  for (const { style } of rows) { // boxes grow; those of a poll keep the room of its ideas
+    style.minHeight = `${Math.max(high, Math.min(165, high + (room - words.offsetHeight) / rows.length))}px`;
   }
-  for (const [, option, idea] of section.matches(".poll") ? all(".option", section).map((row) => row.children) : []) {
-    option.style.top = `${idea.offsetHeight / 2 + 2}px`; // in the middle of its box, as the idea is hidden
-  }
-  const gap = parseFloat(getComputedStyle(words).rowGap), free = (room - words.offsetHeight) / (2 * words.children.length);
-  if (section.matches(".plain")) words.style.gap = `${gap + Math.max(0, Math.min(36, free))}px`;
 };
 
 // Pictures of the current and of the next slide become interactive; on paper, pictures are stills.
 const revive = async (section) => {
-  for (const script of section ? all("figure > script[type]", section) : []) {
-    const figure = script.parentElement, image = figure.querySelector("img"), own = JSON.parse(script.text);
-    const data = window.rbcourseStates?.[own] ?? own; // the book keeps the data in files
-    for (const each of all("script", figure)) each.remove();
-    figure.dataset.ratio = data.size[0] / data.size[1];
-    await rbcourseDisplay.revive(image, data);
-    if (section.matches(".split")) { // sliders and numbers stand below the text, so that the picture is large
-      const panel = Object.assign(document.createElement("div"), { className: "panel" });
-      panel.append(...all(":scope > div > div:is(:has(> input), :last-child)", figure));
-      section.querySelector(".words").append(panel);
-      new ResizeObserver(() => fit(figure)).observe(panel); // the numbers come later
-    }
-    const asked = section.parentElement.querySelector(".title, .poll") && !section.dataset.told;
-    section.classList.toggle("quiet", Boolean(data.controls.length > 1 && asked));
-    fit(figure);
+  const script = section?.querySelector("figure > script[type]"), figure = script?.parentElement;
+  if (!script) return;
+  const own = JSON.parse(script.text), data = window.rbcourseStates?.[own] ?? own; // the book keeps the data in files
+  for (const each of all("script", figure)) each.remove();
+  figure.dataset.ratio = data.size[0] / data.size[1];
+  await rbcourseDisplay.revive(figure.querySelector("img"), data);
+  if (section.matches(".split")) { // sliders and numbers stand below the text, so that the picture is large
+    const panel = Object.assign(document.createElement("div"), { className: "panel" });
+    panel.append(...all(":scope > div > div:is(:has(> input), :last-child)", figure));
+    section.querySelector(".words").append(panel);
+    new ResizeObserver(() => fit(figure)).observe(panel); // the numbers come later
   }
+  const asked = section.parentElement.querySelector(".title, .poll") && !section.dataset.told;
+  section.classList.toggle("quiet", Boolean(data.controls.length > 1 && asked));
+  fit(figure);
 };
 
 const keys = {
@@ -101,11 +86,7 @@ const keys = {
   T: ["Open or close a vote", () => {
     if (window !== window.top) return window.top.opener?.Reveal.triggerKey(84); // in the speaker view
     const section = Reveal.getCurrentSlide(), poll = section.dataset.poll;
-    const options = all(".option > div", section).map((option) => {
-      const copy = option.cloneNode(true);
-      all("mjx-assistive-mml", copy).forEach((part) => part.remove());
-      return copy.innerHTML;
-    });
+    const options = all(".option > div", section).map(({ innerHTML }) => innerHTML.replace(/<mjx-assistive-mml.*?<\/mjx-assistive-mml>/gs, ""));
     if (voting && (poll || state.open)) ask(state.open ? {} : { poll, options });
   }],
 };
@@ -116,11 +97,9 @@ const ask = async (body) => {
   const answer = await fetch(`votes${location.search}`, body && { method: "POST", body: JSON.stringify(body) }).catch(() => null);
   if (!answer?.ok) return;
   state = await answer.json();
-  const panel = document.querySelector("#vote");
+  const panel = document.querySelector("#vote"), votes = `${state.voters} ${state.voters === 1 ? "vote" : "votes"}`;
   panel.hidden = !state.open;
-  document.documentElement.classList.toggle("voting", state.open);
-  const votes = `${state.voters} ${state.voters === 1 ? "vote" : "votes"}`;
-  if (state.open) panel.innerHTML = `${state.code}<div>${state.address.replace("http://", "")}</div><div>${votes}</div>`;
+  panel.innerHTML = `${state.code}<div>${state.address.replace("http://", "")}</div><div>${votes}</div>`;
   for (const section of sections.filter(({ dataset }) => dataset.poll && dataset.poll === state.poll)) {
     all(".option", section).forEach((option, i) => {
       const share = `${Math.round((100 * (state.counts[i] ?? 0)) / (state.voters || 1))}%`;
@@ -130,21 +109,25 @@ const ask = async (body) => {
   }
 };
 
-// The slides after the end are not counted.
+// The slides after the end are not counted. The bar has a part for each section.
+const count = 1 + sections.findIndex((section) => section.matches(".end"));
 const numbered = (slide) => {
-  const [count, at] = [document.querySelector(".end"), slide ?? Reveal.getCurrentSlide()].map((each) => 1 + sections.indexOf(each));
-  if (!printing) document.querySelector("#bar").style.width = `${(100 * Math.min(at, count)) / count}%`;
+  const at = 1 + sections.indexOf(slide ?? Reveal.getCurrentSlide()), bar = document.querySelector("#bar");
+  let before = 0;
+  bar.replaceChildren(...(printing ? [] : all(".slides > section")).map(({ children }) => {
+    const size = Math.min(children.length, count - before), part = document.createElement("i");
+    part.style = `flex: ${size}; --done: ${(100 * (at - before)) / size}%`;
+    before += size;
+    return part;
+  }));
   return [at <= count ? `${at} / ${count}` : `end + ${at - count}`];
 };
 
 const show = ({ currentSlide }) => {
   if (printing) return;
-  if (currentSlide.matches(".verdict")) { // show readouts from now on
-    const before = all("section", currentSlide.parentElement);
-    for (const section of before) {
-      section.dataset.told = "yes";
-      section.classList.remove("quiet");
-    }
+  for (const section of currentSlide.matches(".verdict") ? all("section", currentSlide.parentElement) : []) {
+    section.dataset.told = "yes"; // show readouts from now on
+    section.classList.remove("quiet");
   }
   all("figure", currentSlide).forEach(fit);
   revive(currentSlide).then(() => revive(sections[sections.indexOf(currentSlide) + 1]));
@@ -175,9 +158,6 @@ const begin = async () => {
   for (const [key, [description, act]] of Object.entries(keys)) {
     Reveal.addKeyBinding({ keyCode: key.charCodeAt(0), key, description }, act);
   }
-  const sharpen = () => { window.pixels = window.devicePixelRatio * Reveal.getScale(); };
-  sharpen();
-  Reveal.on("resize", sharpen);
   Reveal.on("slidechanged", show);
   show({ currentSlide: Reveal.getCurrentSlide() });
   // A remote control changes slides even after a slider was moved. Some keyboards have "?" on another key.
