@@ -34,10 +34,10 @@ SHARES = {
     r"lesson08_half, turn \[rad\]": 0,  # the body is turned by this angle
     r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # only the frames at the ends are drawn
     # the place of the cell in the map shows both values
-    r"lesson1[23]_(median_\w+|ninety_\w+|atlas), (displacement|end velocity) .*": 0,
+    r"lesson1[23]_(median_\w+|ninety_\w+|atlas\w*), (displacement|end velocity) .*": 0,
 }
 FIGURES = Path(__file__).parents[1] / "figures"
-LETTERS = str.maketrans("ω₁₂₃", "w123")  # labels have ω₁, columns have w1
+LETTERS = str.maketrans("ω₁₂₃", "w123", "$")  # labels have ω₁ and $x$, columns have w1 and x
 BAR = "<colorbar>"
 GETTERS = "get_data", "get_data_3d", "get_segments", "get_xy", "get_offsets", "get_array"
 

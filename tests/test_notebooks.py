@@ -18,7 +18,7 @@ LESSONS = {
 }
 START, *TAUGHT = LESSONS
 TAGS = {"nbval-check-output", "nbval-ignore-output", "nbval-skip", "parameters", "raises-exception"}
-TAGS |= {"not-in-lectures", "hide-input", "hide-output", "remove-cell"}
+TAGS |= {"hide-input", "hide-output", "remove-cell"}
 TAGS |= {"remove-input", "solution"}
 RESIDUE = re.compile(r"(?<!< )\b\d\.?\d*e-(?:1[3-9]|[2-9]\d|\d{3})|\d\.\d{14,}|-0\.(?!\d)")
 CLOCK = re.compile(r"^\s*(?:%%?time|(?:import|from)\b.*\b(?:time|timeit|datetime)\b)", re.MULTILINE)

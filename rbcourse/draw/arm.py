@@ -17,6 +17,7 @@ from rbcourse.arm import LINKS, arm_forward_kinematics, arm_tip_jacobian
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
 _LOOKS = [(COLOURS["path"], "-"), (COLOURS["y"], "--"), (COLOURS["projection"], "-.")]
+_MOTORS = [COLOURS["optimum"], COLOURS["projection"], COLOURS["screw"]]
 
 
 def path_table(path: ArrayLike, lengths: ArrayLike = LINKS) -> Table:
@@ -38,32 +39,33 @@ def draw_posture(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
     for i, (joint, before, after) in enumerate(
         zip(joints[:-1], headings[:-1], headings[1:], strict=True)
     ):
-        ax.annotate(f"J{i}", joint, (4, -24), textcoords="offset points")
+        ax.annotate(f"$J_{i}$", joint, (4, -24), textcoords="offset points")
         ax.plot(*np.transpose([joint, joint + 0.9 * _towards(before)]), color=PALE, lw=1, ls="--")
         low, high = sorted(np.degrees([before, after]))
         ax.add_patch(Arc(joint, 1.2, 1.2, theta1=low, theta2=high, lw=1.5, color="0.3"))
         x, y = joint + 0.8 * _towards((before + after) / 2)
-        ax.text(x, y, f"$θ_{i}$", ha="center", va="center")
+        ax.text(x, y, rf"$\theta_{i}$", ha="center", va="center")
         artists += _draw_frame(ax, joints[i : i + 2].mean(axis=0), after)
     ax.annotate("tip", joints[-1], (8, 8), textcoords="offset points")
-    ax.margins(0.15)
-    ax.set(xlabel="x (m)", ylabel="y (m)")
-    ax.set_aspect("equal")
+    _show_all(ax)
     return artists
 
 
 def draw_tip_velocities(ax: Axes, q: Array, lengths: ArrayLike = LINKS) -> list[Any]:
-    """Draw an arm, and arrows at its tip that show the columns of the Jacobian.
+    """Draw an arm, and named arrows at its tip that show the columns of the Jacobian.
 
     Return the artists of the links, then an arrow for each joint. An arrow is half as long as the
     distance that the tip moves per radian of the joint (RR 4).
     """
-    show_reach(ax, lengths)
     joints = _joints(q, lengths)
     artists: list[Any] = ax.plot(*joints.T, "o-", color=COLOURS["z"], lw=4, ms=8, alpha=0.75)
-    for i, column in enumerate(arm_tip_jacobian(q, lengths).T):
-        colour = _LOOKS[i % len(_LOOKS)][0]
-        artists.append(_draw_arrow(ax, joints[-1], column / 2, colour, f"motor {i} runs"))
+    for i, (x, y) in enumerate(arm_tip_jacobian(q, lengths).T / 2):
+        colour, end = _MOTORS[i % len(_MOTORS)], joints[-1] + [x, y]
+        artists.append(_draw_arrow(ax, joints[-1], np.array([x, y]), colour))
+        aside = (-1) ** i * np.array([34 * y, -14 * x]) / max(np.hypot(x, y), 1e-9)
+        _write(ax, f"motor {i}", end, aside, colour)
+        ax.update_datalim([end])
+    _show_all(ax)
     return artists
 
 
@@ -78,6 +80,7 @@ def moving_arm(
     """
     joints = _joints(path, lengths)
     show_reach(ax, lengths)
+    ax.locator_params(nbins=5)
     for i in shown:
         ax.plot(*joints[i].T, "o-", color=PALE, lw=2, ms=5, zorder=1.5)
     (links,) = ax.plot([], [], "o-", color=COLOURS["z"], lw=4, ms=8, zorder=3)
@@ -102,8 +105,7 @@ def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LIN
     for i in (0, len(joints) // 2, -1):
         ax.plot(*joints[i].T, "o-", color=PALE, lw=3, ms=6, zorder=1.5)
     for i, word in ((0, "start"), (-1, "goal")):
-        place, side = ((-12, -18), "right") if joints[i, -1, 0] > 0 else ((12, -18), "left")
-        ax.annotate(word, joints[i, -1], place, textcoords="offset points", ha=side)
+        _write(ax, word, joints[i, -1], (-28 if joints[i, -1, 0] > 0 else 28, -14), "black")
     return [
         ax.plot(*_joints(path, lengths)[:, -1].T, color=colour, ls=ls, label=name, zorder=3)[0]
         for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True)
@@ -111,13 +113,16 @@ def draw_arm_ways(ax: Axes, paths: Mapping[str, Array], lengths: ArrayLike = LIN
 
 
 def draw_joint_ways(ax: Axes, paths: Mapping[str, Array]) -> list[Any]:
-    """Draw up to three paths of a two-link arm in the plane of its joint angles (RR 4.1)."""
-    lines = [
-        ax.plot(*np.degrees(path).T, color=colour, ls=ls, label=name)[0]
-        for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True)
-    ]
-    ax.set(xlabel="$θ_0$ (degrees)", ylabel="$θ_1$ (degrees)")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
+    """Draw up to three paths of a two-link arm, with names, in the plane of its angles (RR 4.1)."""
+    lines = []
+    for (name, path), (colour, ls) in zip(paths.items(), _LOOKS[: len(paths)], strict=True):
+        lines += ax.plot(*np.degrees(path).T, color=colour, ls=ls, label=name)
+        _write(ax, name, np.degrees(path[len(path) // 2]), (0, 12), colour)
+    for i, word in ((0, "start"), (-1, "goal")):
+        _write(ax, word, np.degrees(path[i]), (0, -14), "black")
+    ax.set(xlabel=r"$\theta_0$ (degrees)", ylabel=r"$\theta_1$ (degrees)")
+    ax.margins(0.1, 0.2)
+    ax.locator_params(nbins=4)
     return lines
 
 
@@ -127,7 +132,7 @@ def show_reach(ax: Axes, lengths: ArrayLike = LINKS) -> None:
     for radius in (total, max(0.0, 2 * longest - total)):
         ax.add_patch(Circle((0, 0), radius, fill=False, ls=":", color="0.5", lw=1.5))
     edge = 1.08 * total
-    ax.set(xlim=(-edge, edge), ylim=(-edge, edge), xlabel="x (m)", ylabel="y (m)")
+    ax.set(xlim=(-edge, edge), ylim=(-edge, edge), xlabel="$x$ (m)", ylabel="$y$ (m)")
     ax.set_aspect("equal")
 
 
@@ -188,18 +193,29 @@ def _joints(q: ArrayLike, lengths: ArrayLike) -> Array:
     return arm_forward_kinematics(q, lengths).joints
 
 
+def _show_all(ax: Axes) -> None:
+    ax.margins(0.15)
+    ax.locator_params(nbins=5)
+    ax.set(xlabel="$x$ (m)", ylabel="$y$ (m)", aspect="equal")
+
+
+def _write(ax: Axes, word: str, place: Any, aside: Any, colour: str) -> None:
+    centred: Any = {"textcoords": "offset points", "ha": "center", "va": "center"}
+    ax.annotate(word, place, aside, color=colour, **centred)
+
+
 def _draw_frame(ax: Axes, origin: Array, heading: float) -> list[Any]:
     along, left = 0.45 * _towards(heading), 0.45 * _towards(heading + np.pi / 2)
     for axis, (x, y) in {"x": origin + along - 0.3 * left, "y": origin + 1.3 * left}.items():
-        ax.text(x, y, axis, color=COLOURS[axis], ha="center", va="center")
+        ax.text(x, y, f"${axis}$", color=COLOURS[axis], ha="center", va="center")
     return [
         _draw_arrow(ax, origin, arrow, COLOURS[axis]) for axis, arrow in (("x", along), ("y", left))
     ]
 
 
-def _draw_arrow(ax: Axes, start: Array, along: Array, colour: str, label: str | None = None) -> Any:
-    style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 4, "width": 0.008}
-    return ax.quiver(*start, *along, color=colour, label=label, **style)
+def _draw_arrow(ax: Axes, start: Array, along: Array, colour: str) -> Any:
+    style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 4, "width": 0.012}
+    return ax.quiver(*start, *along, color=colour, **style)
 
 
 def _towards(heading: float) -> Array:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from rbcourse import Array, Curve, angle_between
 from rbcourse.draw.save import COLOURS, Table
@@ -123,20 +124,22 @@ def set_space(
             marks = np.array([start[k], *ticks[k], end[k]])
             last = len(marks) - 2 - np.diff(marks)[::-1].round(9).argmax()
             place = start + (marks[last : last + 2].mean() - start[k]) * along + 3 * beside[k]
-        ax.text(*place, f"{name} (m)", **centred)
+        ax.text(*place, f"${name}$ (m)", **centred)
 
 
 def set_turning(ax: Any, reach: float, zoom: float, lw: float = 2.0, named: bool = False) -> None:
     """Fit the axes to a turning body whose points are within `reach` (in m) of the origin.
 
-    Draw the axes of the fixed frame in a pale colour, with the line width `lw` and maybe names.
+    Draw the axes of the fixed frame in a pale colour, with the line width `lw` and maybe names. In
+    the initial view the body does not cover the names.
     """
-    for name, room in zip("xyz", reach * np.eye(3), strict=True):
-        ax.plot(*np.stack([-room, room], axis=1), color="0.85", lw=lw, zorder=0)
-        if named:
-            ax.text(*(1.12 * room), name, color="0.5", ha="center", va="center")
-    ax.fit(np.full(3, -reach), np.full(3, reach), zoom)
+    ax.fit(np.full(3, -reach), reach * np.array([1, 1, 1.15 if named else 1]), zoom)
     ax.view_init(elev=20, azim=-55)
+    for name, axis in zip("xyz", np.eye(3), strict=True):
+        far = reach / float(np.linalg.norm(np.cross(axis, ax.sight().eye))) if named else reach
+        ax.plot(*np.outer(axis, [-reach, far]), color="0.85", lw=lw, zorder=0)
+        if named:
+            ax.text(*(1.1 * far * axis), f"${name}$", color="0.5", ha="center", va="center")
 
 
 def draw_ground(ax: Any, low: Array, high: Array) -> None:
@@ -164,11 +167,11 @@ def describe_cube_motion(poses: Array) -> str:
     )
 
 
-def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
+def draw_ways(ax: Any, ways: Mapping[str, Array], places: ArrayLike = ()) -> list[Any]:
     """Draw up to three motions of a frame: the paths of its origin, and the frame at the ends.
 
-    The motions begin at the same pose, where letters mark the axes of the frame. Return a line for
-    each motion (BK 2.6).
+    The motions begin at the same pose, where letters mark the axes of the frame. The names of the
+    motions are written at `places`, shape (motions, 3). Return a line for each motion (BK 2.6).
     """
     looks: list[dict[str, Any]] = [
         {"color": COLOURS["optimum"], "ls": "-", "lw": 2},
@@ -179,11 +182,13 @@ def draw_ways(ax: Any, ways: Mapping[str, Array]) -> list[Any]:
         ax.plot(*poses[:, :3, 3].T, label=name, **look)[0]
         for (name, poses), look in zip(ways.items(), looks, strict=False)
     ]
+    for line, place in zip(lines, np.asarray(places), strict=False):
+        ax.text(*place, line.get_label(), color=line.get_color(), ha="center", va="center")
     start, ends = next(iter(ways.values()))[0], list[Array]()
     for poses in ways.values():
         if all(np.abs(poses[-1] - other).max() > 1e-9 for other in ends):
             ends.append(poses[-1])
-    draw_triad(ax, start[:3, 3], start[:3, :3], "0")
+    draw_triad(ax, start[:3, 3], start[:3, :3], "0", (1.4, 1.9, 1.4))
     for pose in ends:
         draw_triad(ax, pose[:3, 3], pose[:3, :3])
     places = [poses[:, :3, 3] for poses in ways.values()]
@@ -222,7 +227,7 @@ def moving_boxes(
             draw_centre_path(ax, poses[:: max(1, len(poses) // 10), :3, 3])
         else:
             reach = 0.5 * float(np.linalg.norm(edges * np.ones(3)))
-            set_turning(ax, reach, zoom=1.3, named=True)
+            set_turning(ax, reach, zoom=1.5, named=True)
         ax.set_title(name)
 
     def update(i: int) -> list[Any]:
@@ -248,13 +253,16 @@ def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
     return said
 
 
-def draw_triad(ax: Any, origin: Array, R: Array, name: str = "") -> None:
-    """Draw the columns of R as arrows from `origin`; a `name` adds letters with this index."""
-    for axis, direction in zip("xyz", R.T, strict=True):
+def draw_triad(ax: Any, origin: Array, R: Array, name: str = "", at: ArrayLike = 1.4) -> None:
+    """Draw the columns of R as arrows from `origin`.
+
+    A `name` adds letters with this index, at multiples `at` of the arrows.
+    """
+    for axis, direction, far in zip("xyz", R.T, np.broadcast_to(at, 3), strict=True):
         draw_arrow(ax, origin, direction, COLOURS[axis])
         if name:
             letter: Any = {"color": COLOURS[axis], "ha": "center", "va": "center"}
-            ax.text(*(origin + 1.4 * direction), f"${axis}_{name}$", **letter)
+            ax.text(*(origin + far * direction), f"${axis}_{name}$", **letter)
 
 
 def draw_arrow(ax: Any, start: Array, along: Array, color: str) -> None:

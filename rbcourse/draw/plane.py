@@ -112,7 +112,7 @@ def show_plane(ax: Axes, paths: Iterable[Array], length: float) -> None:
     places = np.concatenate([path[:, :2] for path in paths])
     margin = 0.75 * length
     (left, low), (right, high) = places.min(axis=0) - margin, places.max(axis=0) + margin
-    ax.set(xlim=(left, right), ylim=(low, high), xlabel="x (m)", ylabel="y (m)")
+    ax.set(xlim=(left, right), ylim=(low, high), xlabel="$x$ (m)", ylabel="$y$ (m)")
     ax.set_aspect("equal")
 
 

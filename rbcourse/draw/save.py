@@ -7,6 +7,7 @@ A table is a dict of columns of equal shape, with units in their names:
 import csv
 import html
 import io
+import logging
 import os
 import re
 from collections.abc import Callable, Mapping
@@ -24,6 +25,8 @@ from rbcourse.draw.display import Display, Player
 from rbcourse.draw.pictures import data_url, drawn, png
 from rbcourse.draw.space import scenes
 
+# fontTools reports the dates of the fonts of formulas, which come with Matplotlib
+logging.getLogger("fontTools").setLevel(logging.ERROR)
 Table = Mapping[str, ArrayLike]
 UNITS = ("1", "m", "m²", "rad", "rad²", "s", "m/s", "rad/s", "m/s²", "rad/s²", "N m")
 """The units; the name of each column of numbers ends with one of them in brackets."""
@@ -35,7 +38,7 @@ COLOURS = {
     "y": "#009E73",
     "z": "#0072B2",
     "optimum": "#000000",
-    "projection": "#C2649A",
+    "projection": "#AE598E",
     "screw": "#8821D9",
     "reference": "#585858",
     "path": "#BB0000",

@@ -44,20 +44,22 @@ def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[A
     """Draw one sphere per sample; return a function that draws images of v0 and v1 on the spheres.
 
     A dot is the image of v0. The stroke from the dot ends at the image of v1, so that a turn about
-    v0 is visible, too. ``update(i)`` shows the first i rotations and returns
-    the artists that change (RR 2.2, RR Fig. 4, RR Fig. 5).
+    v0 is visible, too. The samples are pink and blue in turn. ``update(i)`` shows the first i
+    rotations and returns the artists that change (RR 2.2, RR Fig. 4, RR Fig. 5).
     """
     panels = []
-    for ax, (name, pair) in zip(axes, images.items(), strict=True):
+    for k, (ax, (name, pair)) in enumerate(zip(axes, images.items(), strict=True)):
         draw_sphere(ax)
         for axis, direction in zip("xyz", np.eye(3), strict=True):
             ax.plot(*np.outer(direction, [1, 1.2]), color=COLOURS[axis], lw=2)
-            ax.text(*(1.18 * direction), f"  {axis}", color=COLOURS[axis], va="center", zorder=OVER)
+            place, look = 1.18 * direction, {"color": COLOURS[axis], "va": "center"}
+            ax.text(*place, f"  ${axis}$", zorder=OVER, **look)
         ax.set_title(name)
+        colour = COLOURS["z" if k % 2 else "projection"]
         gaps = np.full_like(pair[0], np.nan)  # between successive strokes
         strokes = np.stack([*pair, gaps], axis=1)
-        lines = ax.plot([], [], [], color=COLOURS["projection"], lw=1.6)[0]
-        dots = ax.plot([], [], [], "o", ms=5, mew=0, color=COLOURS["projection"])[0]
+        lines = ax.plot([], [], [], color=colour, lw=1.6)[0]
+        dots = ax.plot([], [], [], "o", ms=5, mew=0, color=colour)[0]
         panels.append((strokes, lines, dots))
 
     def update(i: int) -> list[Any]:

@@ -57,12 +57,19 @@ def test_a_box_that_stays_at_the_origin_fills_its_axes(axes):
             assert off(box, poses[i], in_body) < 1e-14
     assert [ax.get_title() for ax in axes] == ["screw", "still"]
     reach = np.linalg.norm(edges) / 2
-    assert axes[1].get_xlim() == axes[1].get_ylim() == axes[1].get_zlim() == (-reach, reach)
-    assert [text.get_text() for text in axes[1].texts] == ["x", "y", "z"]
+    assert axes[1].get_xlim() == axes[1].get_ylim() == (-reach, reach)
+    assert [text.get_text() for text in axes[1].texts] == ["$x$", "$y$", "$z$"]
+    eye = axes[1].sight().eye
+    for text in axes[1].texts:  # beyond the ball in which the box turns
+        assert np.linalg.norm(np.cross(text.get_position_3d(), eye)) == pytest.approx(1.1 * reach)
 
 
 def test_paths_are_drawn_with_the_frames_at_their_ends(axes):
-    lines = bodies.draw_ways(axes[0], MOTIONS)
+    places = [[1, 2, 3], [4, 0, 1]]
+    lines = bodies.draw_ways(axes[0], MOTIONS, places)
+    for text, line, place in zip(axes[0].texts, lines, places, strict=False):
+        assert (text.get_text(), text.get_color()) == (line.get_label(), line.get_color())
+        assert text.get_position_3d() == tuple(place)
     for line, (name, poses) in zip(lines, MOTIONS.items(), strict=True):
         assert np.array_equal(line.get_data_3d(), poses[:, :3, 3].T)
         assert line.get_label() == name
@@ -70,7 +77,7 @@ def test_paths_are_drawn_with_the_frames_at_their_ends(axes):
     assert len({line.get_linestyle() for line in lines}) == 2
     back = rb.screw_se3(np.eye(4), rb.inverse_se3(A1))(TIMES)
     bodies.draw_ways(axes[1], {**MOTIONS, "back": back})
-    names = [[text.get_text() for text in ax.texts if "$" in text.get_text()] for ax in axes]
+    names = [[text.get_text() for text in ax.texts if "_" in text.get_text()] for ax in axes]
     assert names == 2 * [["$x_0$", "$y_0$", "$z_0$"]]
     bodies.draw_ways(axes[0], {"straight": GEODESIC})
     axes[0].sight()  # this works although the path is not in a plane
@@ -86,16 +93,16 @@ def test_axis_names_overlap_no_text(view, axes):
     found, words = seen.flat(seen.scale * (at - seen.middle)), [x.get_text() for x in ax.texts]
     low, high = places.min(axis=0) - 1.8, places.max(axis=0) + 1.8
     numbers = 0.1 * np.max(high - low)
-    for i in (words.index(f"{name} (m)") for name in "xyz"):
+    for i in (words.index(f"${name}$ (m)") for name in "xyz"):
         across, up = np.abs(np.delete(found, i, axis=0) - found[i]).T
         assert ((across > 30) | (up > 12)).all(), words[i]
-    assert at[words.index("x (m)"), 1] < low[1] - numbers
-    assert at[words.index("y (m)"), 0] > high[0] + numbers
+    assert at[words.index("$x$ (m)"), 1] < low[1] - numbers
+    assert at[words.index("$y$ (m)"), 0] > high[0] + numbers
 
 
 def test_letters_of_a_frame_are_beyond_the_tips_of_its_arrows(axes):
     R, origin = A1[:3, :3], A1[:3, 3]
-    bodies.draw_triad(axes[0], origin, R, "M")
+    bodies.draw_triad(axes[0], origin, R, "M", (1.4, 1.2, 2))
     for text, direction in zip(axes[0].texts, R.T, strict=True):
         beyond = text.get_position_3d() - origin
         assert np.abs(np.cross(beyond, direction)).max() < 1e-14

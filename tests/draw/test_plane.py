@@ -28,7 +28,7 @@ def assert_body(outline, nose, pose, length):
     assert np.abs(outline.get_xy()[:4] - corners).max() < 1e-14
     low, high = np.array([ax.get_xlim(), ax.get_ylim()]).T
     assert ((low < corners) & (corners < high)).all()
-    assert (ax.get_aspect(), ax.get_xlabel(), ax.get_ylabel()) == (1, "x (m)", "y (m)")
+    assert (ax.get_aspect(), ax.get_xlabel(), ax.get_ylabel()) == (1, "$x$ (m)", "$y$ (m)")
 
 
 @pytest.mark.source("RR 3.3", "RR Fig. 6", "RR Fig. 7")

@@ -35,18 +35,19 @@ def body_explorer() -> Explorer:
     artists: dict[str, Any] = {}
     with new_figure() as fig:
         for k, (law, style) in enumerate(LOOKS.items()):
-            space = new_space(fig, (k / 3 - 0.05, 0.41, 0.43, 0.53), 0.8)
+            space = new_space(fig, (k / 3 - 0.063, 0.428, 0.459, 0.566), 0.8)
             artists[law] = draw_box(space, np.eye(4), 1.0)
-            fig.text((k + 0.5) / 3, 0.92, law, color=style["color"], ha="center")
-        ax = fig.add_axes((0.13, 0.18, 0.83, 0.26))
-        ax.set(xlim=(0, 1), ylim=(0, 0.3), xlabel="time (s)", ylabel="torque (N m)")
-        ax.set_yticks([0, 0.1, 0.2, 0.3])
+            fig.text((k + 0.5) / 3, 0.94, law, color=style["color"], ha="center")
+        ax = fig.add_axes((0.13, 0.092, 0.83, 0.39))
+        ax.set(xlim=(0, 1), ylim=(0, 0.2), xlabel="time (s)", ylabel="torque (N m)")
+        ax.set(xticks=[0, 0.5, 1], yticks=[0, 0.1, 0.2])
+        ax.xaxis.set_label_coords(0.75, -0.035)  # between two numbers, which leaves more room
         artists["now"] = ax.axvline(0, color=PALE, lw=1)
         artists |= {f"{law} torque": new_line(ax, **style) for law, style in LOOKS.items()}
     controls = {
         "about": widgets.menu("turned about", list(_AXES)),
         "turn": widgets.slider("turn (°)", 150, 5, 175, 5),
-        "thickness": widgets.slider("thickness (cm)", 3, 1, 30, 1),
+        "thickness": widgets.slider("thickness (cm)", 3, 1, 15, 1),
         "t": widgets.stepped("time (s)", 0.0, 0.0, 1.0, 0.02),
     }
 

@@ -8,6 +8,7 @@ import numpy as np
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
+from rbclassroom.explorers.names import new_name, put_name
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION
@@ -31,31 +32,36 @@ def theta_explorer() -> Explorer:
     ``t``, which the play button moves (BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Fig. 2).
     """
     with new_figure() as fig:
-        ax = fig.add_axes((0.0, 0.1, 0.47, 0.8))
-        ax.set(xlim=(-1.12, 1.12), ylim=(-0.35, 1.25), aspect="equal")
+        ax = fig.add_axes((0.0, 0.1, 0.645, 0.82))
+        # the height 0 is that of the right picture
+        ax.set(xlim=(-1.03, 1.3), ylim=(-0.196, 1.25), aspect="equal", anchor="SW")
         ax.set_axis_off()
-        side = fig.add_axes((0.57, 0.18, 0.39, 0.74))
-        side.plot([0, 1], [0, 1], color=COLOURS["reference"], lw=1)
-        side.set(xlim=(0, 1), ylim=(0, 1), xlabel="time t", xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
-        black, pink = ({"color": COLOURS[name]} for name in ("optimum", "projection"))
+        side = fig.add_axes((0.725, 0.18, 0.25, 0.74))
+        side.set(xlim=(0, 1), ylim=(0, 1), xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
+        side.set_xlabel("time $t$")
+        black: Any = {"color": COLOURS["optimum"]}
+        pink: Any = {"color": COLOURS["projection"]}
         side.tick_params("y", pad=8)  # otherwise the dots cover the numbers
+        side.plot([0, 1], [0, 1], **black, lw=1.5)
+        side.text(0.53, 0.4, "geodesic", **black)
+        side.text(0.45, 0.85, r"$\theta(t)$", ha="right", **pink)
+        ax.text(0, 1.12, "geodesic", ha="center", **black)
+        ax.text(0, -0.16, "projection", ha="center", **pink)
         dot: dict[str, Any] = {"marker": "o", "ms": 10, "ls": ""}
         artists = {
             "arc": new_line(ax, **black, lw=2.5),
             "chord": new_line(ax, **black, lw=1),
             "ray": new_line(ax, **pink, ls="--", lw=1.5),
-            "even": new_line(ax, **black, **dot, mfc="white", label="geodesic"),
-            "line": new_line(ax, **black, **{**dot, "ms": 5}, label="line"),
-            "shadow": new_line(ax, **pink, **dot, label="its projection"),
-            "theta": new_line(side, **pink, label="θ(t)"),
+            "even": new_line(ax, **black, **dot, mfc="white"),
+            "line": new_line(ax, **black, **{**dot, "ms": 5}),
+            "line name": new_name(ax, "line", ha="left", va="top"),
+            "shadow": new_line(ax, **pink, **dot),
+            "theta": new_line(side, **pink),
             "theta now": new_line(side, **pink, **dot, clip_on=False),
         }
-        handles = [artists[name] for name in ("even", "line", "shadow")]
-        fig.legend(handles=handles, loc="lower left", handlelength=1, bbox_to_anchor=(0, -0.01))
-        side.legend(loc="upper left", handlelength=1.4)
     controls = {
         "angle": widgets.slider("angle a (°)", 120.0, 1.0, 179.0, 1.0),
-        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
+        "t": widgets.stepped("time t", 0.3, 0.0, 1.0, 0.01),
     }
 
     def show(angle: float, t: float) -> dict[str, str]:
@@ -67,6 +73,7 @@ def theta_explorer() -> Explorer:
         places["ray"] = np.append(0, places["shadow"])
         for name, where in places.items():
             artists[name].set_data(where.real, where.imag)
+        put_name(artists["line name"], [ends[1].real + 0.06, ends[1].imag - 0.04])
         artists["theta"].set_data(_TIMES, theta(_TIMES, a))
         artists["theta now"].set_data([t], [theta(t, a)])
         said = {"θ(t)": theta(t, a), "dθ/dt": theta(t, a, 1)}
@@ -84,19 +91,21 @@ def screw_explorer() -> Explorer:
     button moves (BK 2.6, BK (10), BK (14)).
     """
     with new_figure() as fig:
-        ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.5)
+        ax = new_space(fig, (-0.27, -0.27, 1.51, 1.51), 2.5)
         draw_box(ax, np.eye(4), _SIDE).set_alpha(0.3)
         black, violet = COLOURS["optimum"], COLOURS["screw"]
         artists: dict[str, Any] = {
-            "axis": new_line(ax, color=COLOURS["reference"], ls="-.", lw=2, label="its axis"),
-            "geodesic way": new_line(ax, color=black, label="geodesic"),
-            "screw way": new_line(ax, color=violet, ls="--", label="screw"),
+            "axis": new_line(ax, color=COLOURS["reference"], ls="-.", lw=2),
+            "axis name": new_name(ax, "axis of the screw", color=COLOURS["reference"]),
+            "geodesic way": new_line(ax, color=black),
+            "screw way": new_line(ax, color=violet, ls="--"),
             **{name: draw_box(ax, np.eye(4), _SIDE) for name in ("goal", "geodesic", "screw")},
+            "geodesic name": new_name(ax, "geodesic", color=black),
+            "screw name": new_name(ax, "screw", color=violet),
         }
         artists["goal"].set_alpha(0.3)
         artists["geodesic"].set_edgecolor(black)
         artists["screw"].set_edgecolor(violet)
-        fig.legend(loc="lower left", ncols=3, handlelength=1.5, columnspacing=1)
     controls = {
         "angle": widgets.slider("turn (°)", 120.0, -180.0, 180.0, 1.0),
         "tilt": widgets.slider("tilt of axis (°)", 0.0, 0.0, 90.0, 1.0),
@@ -117,7 +126,11 @@ def screw_explorer() -> Explorer:
             move_box(artists[name], pose, _SIDE)
             said[f"turned, {name}"] = apart(np.eye(3), pose[:3, :3])
         bolt = rb.screw_from_pose(goal)
-        artists["axis"].set_data_3d(*(bolt.point + np.outer([-2.5, 2.5], bolt.axis)).T)
+        artists["axis"].set_data_3d(*(bolt.point + np.outer([-1.8, 1.8], bolt.axis)).T)
+        put_name(artists["axis name"], bolt.point - np.copysign(2, bolt.axis[2]) * bolt.axis)
+        above = 0.75 if poses["geodesic"][2, 3] > poses["screw"][2, 3] - 1e-9 else -0.75
+        for name, high in (("geodesic", above), ("screw", -above)):
+            put_name(artists[f"{name} name"], poses[name][:3, 3] + [0, 0, high])
         far = ", not in sight" if np.linalg.norm(bolt.point) > 3 else ""
         origins = np.linalg.norm((poses["screw"] - poses["geodesic"])[:3, 3])
         return said | {
@@ -140,21 +153,23 @@ def flip_explorer() -> Explorer:
     with new_figure() as fig:
         ax = new_space(fig, (-0.05, 0.0, 0.58, 1.0), 0.155)
         ax.view_init(np.degrees(ELEVATION), np.degrees(AZIMUTH))
-        side = fig.add_axes((0.6, 0.19, 0.37, 0.6))
-        side.set(xlim=(0, 8), ylim=(-4.4, 4.4), xlabel="time t (s)", ylabel="ω (rad/s)")
+        side = fig.add_axes((0.61, 0.18, 0.37, 0.68))
+        side.set(xlim=(0, 8), ylim=(-4.4, 4.4), xlabel="time $t$ (s)")
+        side.set_ylabel(r"$\omega$ (rad/s)")
         side.set_xticks([0, 2, 4, 6, 8])
         artists: dict[str, Any] = {"book": draw_box(ax, np.eye(4), _EDGES)}
-        for i, (axis, low, dash) in enumerate(zip("xyz", "₁₂₃", ("-", "--", "-."), strict=True), 1):
+        for i, (axis, dash) in enumerate(zip("xyz", ("-", "--", "-."), strict=True), 1):
             artists[f"axis {i}"] = new_line(ax, color=COLOURS[axis], lw=3.5)
-            artists[f"number {i}"] = ax.text(0, 0, 0, f"{i}", ha="center", va="center")
-            artists[f"w{i}"] = new_line(side, color=COLOURS[axis], ls=dash, label=f"ω{low}")
+            artists[f"number {i}"] = new_name(ax, f"{i}", color=COLOURS[axis])
+            name = rf"$\omega_{i}$"
+            artists[f"w{i}"] = new_line(side, color=COLOURS[axis], ls=dash, label=name)
         artists["now"] = side.axvline(0, color="black", lw=1.5)
         above: Any = {"loc": "lower center", "bbox_to_anchor": (0.4, 1)}
         side.legend(**above, ncols=3, handlelength=1.8, columnspacing=0.6)
     controls = {
         "axis": widgets.choice("spin about", list(_SPINS)),
         "off": widgets.slider("off axis by (°)", 4.0, 0.0, _OFF_MOST, _OFF_STEP),
-        "t": widgets.stepped("time t (s)", 0.0, 0.0, 8.0, 0.04),
+        "t": widgets.stepped("time t (s)", 1.56, 0.0, 8.0, 0.04),
     }
 
     def show(axis: str, off: float, t: float) -> dict[str, str]:
@@ -164,7 +179,7 @@ def flip_explorer() -> Explorer:
         for i, half in enumerate(_EDGES / 2):
             ends = np.outer(R[k, :, i], half * np.array([-1, 1]) + [-0.055, 0.055])
             artists[f"axis {i + 1}"].set_data_3d(*ends)
-            artists[f"number {i + 1}"].set_position_3d((half + 0.085) * R[k, :, i])
+            put_name(artists[f"number {i + 1}"], (half + 0.085) * R[k, :, i])
             artists[f"w{i + 1}"].set_data(_SPIN_TIMES[: k + 1], w[: k + 1, i])
         artists["now"].set_xdata([t, t])
         itself = w[: k + 1, _SPINS[axis]]

@@ -22,10 +22,7 @@ from rbcourse.draw.bodies import set_turning
 from rbcourse.draw.display import ENGINE, Display, joined
 from rbcourse.draw.pictures import data_url, drawn
 
-LABELS = 13.0
-"""Size of all letters in the pictures, in points: 18 pixels."""
-_SIZED = ("legend.fontsize", "legend.title_fontsize", "xtick.labelsize", "ytick.labelsize")
-_STYLES: Any = ["default", "rbcourse.rbcourse", dict.fromkeys(_SIZED, LABELS)]
+_STYLES = ["default", "rbcourse.rbcourse"]
 
 
 class Canvas(anywidget.AnyWidget):

@@ -8,6 +8,7 @@ import numpy as np
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
+from rbclassroom.explorers.names import new_name, put_name
 from rbcourse.draw.bodies import draw_box, draw_ground, move_box
 from rbcourse.draw.save import COLOURS, FORMS, PALE
 
@@ -18,7 +19,7 @@ _SIGMA = np.pi / 6 * np.array([1, 2, 3])
 _SIDE = 3.5
 _LOW, _HIGH = np.array([-2.0, -2, -2]), np.array([10.0, 12, 15])
 _BOX = np.array([1.3, 0.8, 0.25])
-_OUTLINE: Any = {"colours": 7 * ["none"], "edgecolor": COLOURS["projection"], "linewidth": 1.5}
+_OUTLINE: Any = {"colours": 7 * ["none"], "linewidth": 1.5}
 _WAYS = {"optimum": "-", "projection": "--"}
 
 
@@ -32,23 +33,23 @@ def minimum_acceleration_explorer() -> Explorer:
     BK (21), BK 6.2, BK Fig. 4).
     """
     with new_figure() as fig:
-        ax = fig.add_axes((0.12, 0.18, 0.46, 0.69))
-        ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time t", ylabel="σ (rad)")
+        ax = fig.add_axes((0.12, 0.18, 0.46, 0.78))
+        ax.set(xlim=(0, 1), ylim=(-1.2, 2.6), xlabel="time $t$", ylabel=r"$\sigma$ (rad)")
         ax.set(xticks=[0, 0.5, 1], yticks=[-1, 0, 1, 2])
         artists: dict[str, Any] = {}
-        for way, name, dash in (("optimum", "optimum", "-"), ("rival", "closed form", "--")):
+        for way, dash in (("optimum", "-"), ("rival", "--")):
             for axis in "xyz":
                 artists[f"{way} {axis}"] = new_line(ax, color=COLOURS[axis], ls=dash)
-            ax.plot([], [], color="0.3", ls=dash, label=name)
-        for axis, number in zip("xyz", "₁₂₃", strict=True):
-            artists[f"σ{number}"] = ax.text(1.03, 0, f"σ{number}", color=COLOURS[axis], va="center")
-        ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+        for i, axis in enumerate("xyz", start=1):
+            look: Any = {"color": COLOURS[axis], "va": "center"}
+            artists[f"sigma{i}"] = ax.text(1.03, 0, rf"$\sigma_{i}$", **look)
         artists["now"] = ax.axvline(0, color=PALE, lw=1)
-        space = new_space(fig, (0.63, 0.24, 0.41, 0.6), 1.0)
+        space = new_space(fig, (0.585, 0.165, 0.51, 0.75), 1.0)
         for way in ("optimum", "rival"):
             artists[f"{way} box"] = draw_box(space, np.eye(4), _BOX)
-        artists["rival box"].set(**_OUTLINE)
-        fig.text(0.835, 0.2, "the body at t", ha="center")
+        artists["rival box"].set(edgecolor=COLOURS["projection"], **_OUTLINE)
+        fig.text(0.83, 0.88, "optimum, full lines", ha="center")
+        fig.text(0.83, 0.15, "closed form, dashed", ha="center", color=COLOURS["projection"])
     controls = {
         "rival": widgets.menu("closed form", list(FORMS)),
         "size": widgets.slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
@@ -65,8 +66,8 @@ def minimum_acceleration_explorer() -> Explorer:
         artists["now"].set_xdata([t, t])
         # the labels must not overlap
         heights = size * _SIGMA[1] + max(size, 0.5) * (_SIGMA - _SIGMA[1])
-        for number, height in zip("₁₂₃", heights, strict=True):
-            artists[f"σ{number}"].set_position((1.03, height))
+        for i, height in enumerate(heights, start=1):
+            artists[f"sigma{i}"].set_position((1.03, height))
         return {**said, "apart at most": apart(*(curve(_TIMES) for curve in curves))}
 
     return Explorer("Minimum acceleration", fig, artists, controls, show, plays="k", seconds=6)
@@ -75,10 +76,11 @@ def minimum_acceleration_explorer() -> Explorer:
 def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: one cube follows the optimum, another the projection.
 
-    The boundary conditions are those of the paper, but three of them can be changed. The goal has a
-    pale colour. The controls are the ``turn``, as a fraction of the paper's; ``spin``, the last
-    component of ω(1) in rad per unit time; ``rise``, the last component of the final velocity in m
-    per unit time; and the time ``t``, which the play button moves (BK 6.3, BK (14), BK Fig. 5).
+    A blue outline shows the optimum around the projection, too. The boundary conditions are those
+    of the paper, but three of them can be changed. The goal has a pale colour. The controls are the
+    ``turn``, as a fraction of the paper's; ``spin``, the last component of ω(1) in rad per unit
+    time; ``rise``, the last component of the final velocity in m per unit time; and the time ``t``,
+    which the play button moves (BK 6.3, BK (14), BK Fig. 5).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -89,14 +91,15 @@ def cube_explorer() -> Explorer:
             draw_ground(ax, _LOW, _HIGH)
             for name, end, far in zip("xyz", 5 * np.eye(3), (1.5, 1.2, 1.2), strict=True):
                 ax.plot(*np.outer(end, [0, 1]), color=PALE, lw=1.5, zorder=0)
-                ax.text(*(far * end), name, color="0.5", ha="center", va="center")
+                ax.text(*(far * end), f"${name}$", color="0.5", ha="center", va="center")
             artists[f"{way} way"] = new_line(ax, color="black", lw=1, ls=dash)
             artists |= {name: draw_box(ax, np.eye(4), _SIDE) for name in (f"{way} goal", way)}
             artists[f"{way} goal"].set_alpha(0.25)
             fig.text(left + 0.25, 0.94, way, ha="center")
         artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
-        artists["difference"].set(**_OUTLINE)
-        fig.text(0.5, 0.02, "axes: 5 m long; pink outline: the optimum", ha="center")
+        artists["difference"].set(edgecolor=COLOURS["z"], **_OUTLINE)
+        artists["difference name"] = new_name(ax, "optimum", color=COLOURS["z"])
+        fig.text(0.5, 0.02, "axes: 5 m long", ha="center")
     controls = {
         "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
         "spin": widgets.slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),
@@ -111,6 +114,7 @@ def cube_explorer() -> Explorer:
             move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
             move_box(artists[way], curve(t), _SIDE)
         move_box(artists["difference"], curves[0](t), _SIDE)
+        put_name(artists["difference name"], curves[0](t)[:3, 3] - [0, 0, 3.6])
         return {**said, "apart now": apart(*(curve(t)[:3, :3] for curve in curves))}
 
     return Explorer("The cube of Figure 5", fig, artists, controls, show, plays="t")

@@ -55,8 +55,8 @@ def spline_explorer() -> Explorer:
             below.set(xlim=(0, 4), ylim=(0, _STEEPEST), xticks=[0, 1, 2, 3, 4], yticks=[0, 3, 6])
             below.set_xlabel("time (s)")
             below.tick_params(labelleft=i == 0)
-            fig.text(0.3 + 0.48 * i, 0.94, kind, ha="center")
             look: Any = {"color": COLOURS[colour]}
+            fig.text(0.3 + 0.48 * i, 0.94, kind, ha="center", **look)
             dot: Any = {"color": "black", "marker": "o", "ls": "", "clip_on": False}
             artists |= {
                 f"{kind} path": new_line(ax, **look, lw=2),
@@ -67,12 +67,12 @@ def spline_explorer() -> Explorer:
                 f"{kind} ‖ω′‖": new_line(below, **look),
                 f"{kind} ‖ω′‖ now": new_line(below, **dot),
             }
-        fig.text(0.02, 0.42, "‖ω′‖ (rad/s²)")
+        fig.text(0.02, 0.42, r"$\Vert\omega'\Vert$ (rad/s²)")
     controls = {
         "ends": widgets.choice("ends", ["natural", "at rest"]),
         "pitch": widgets.slider("third pitch (°)", -40.0, -60.0, 60.0, 5.0),
         "third": widgets.slider("third time (s)", 2.0, 2.0, 3.0, 0.1),
-        "t": widgets.stepped("time t (s)", 0.0, 0.0, 4.0, 0.05),
+        "t": widgets.stepped("time t (s)", 0.6, 0.0, 4.0, 0.05),
     }
 
     def show(ends: str, pitch: float, third: float, t: float) -> dict[str, str]:
@@ -139,7 +139,7 @@ def chain_explorer() -> Explorer:
     controls = {
         "curve": widgets.menu("joined by", JOINED),
         "duration": widgets.slider("duration (s)", 6.0, 4.0, _LONGEST, 0.5),
-        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
+        "t": widgets.stepped("time t", 0.5, 0.0, 1.0, 0.01),
     }
 
     def show(curve: str, duration: float, t: float) -> dict[str, str]:

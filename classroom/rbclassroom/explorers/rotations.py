@@ -8,12 +8,18 @@ import numpy as np
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
+from rbclassroom.explorers.names import new_name, put_name
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, PALE
+from rbcourse.draw.space import Sight
 from rbcourse.draw.spheres import draw_sphere
 from rbcourse.sampling import sample_rotation_naive, uniformity_tests
 
 _BOX = np.array([1.3, 0.8, 0.25])
+_REACH = float(np.linalg.norm(_BOX)) / 2
+_LEAST = 1.05
+_ENDS = {"first turn": 1.3, "second turn": _LEAST, "third turn": _LEAST, "one axis for all": 1.23}
+"""The axes of turns, and the distances of their named ends from the origin."""
 _SAMPLERS = {"three angles": sample_rotation_naive, "uniform": rb.sample_rotation}
 _MOST = 2000
 _BINS = np.linspace(-1, 1, 21)
@@ -28,14 +34,16 @@ def rotation_explorer() -> Explorer:
     degrees; the play button moves ``beta`` (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
     """
     with new_figure() as fig:
-        ax = new_space(fig, (-0.1, 0.02, 1.2, 1.13), 1.3)
+        ax = new_space(fig, (-0.15, -0.08, 1.28, 1.15), 1.3)
+        sight = ax.sight()
         artists: dict[str, Any] = {"box": draw_box(ax, np.eye(4), _BOX)}
-        for axis, name in zip("zyx", ("first turn", "second turn", "third turn"), strict=True):
-            look = {"ls": "--", "color": COLOURS[axis], "lw": 1.5}
-            artists[name] = new_line(ax, **look, label=f"{name}'s axis")
-        artists["axis"] = new_line(ax, ls=":", color="black", lw=3, label="one axis for all")
+        for axis, name in zip("zyx", _ENDS, strict=False):
+            artists[name] = new_line(ax, ls="--", color=COLOURS[axis], lw=1.5)
+            artists[f"{name} name"] = new_name(ax, name, color=COLOURS[axis])
+        artists["one axis for all"] = new_line(ax, ls=":", color="black", lw=3)
+        artists["one axis for all name"] = new_name(ax, "one axis for all")
         artists |= _axes_of(ax, "body", ls="-", lw=3.5)
-        fig.legend(loc="lower left", ncols=2, handlelength=1.6, columnspacing=1)
+        sizes = [artists[f"{name} name"].get_window_extent().size + 8 for name in _ENDS]
     controls = {
         "alpha": widgets.slider("yaw α (°)", 30.0, -180.0, 180.0, 1.0),
         "beta": widgets.stepped("pitch β (°)", -20.0, -90.0, 90.0, 1.0),
@@ -48,13 +56,17 @@ def rotation_explorer() -> Explorer:
         move_box(artists["box"], rb.pose_from_components(R, np.zeros(3)), _BOX)
         _move_axes(artists, "body", R)
         second = rb.matrix_from_zyx(angles * [1, 0, 0])[:, 1]
-        turns = {"first turn": np.array([0, 0, 1]), "second turn": second, "third turn": R[:, 0]}
-        for name, axis in turns.items():
-            artists[name].set_data_3d(*np.outer(axis, [-1.05, 1.05]))
         r = rb.log_so3(R)
         angle = float(np.linalg.norm(r))
         axis = r / angle if angle > 0 else np.zeros(3)
-        artists["axis"].set_data_3d(*np.outer(axis, [-1.05, 1.05]))
+        turns = np.array([[0, 0, 1], second, R[:, 0], axis])
+        # the last name is not at the ends where the other names are
+        sides = -1, -1, -1, np.copysign(1, turns[:3].sum(axis=0) @ axis)
+        for (name, far), side, along, size in zip(_ENDS.items(), sides, turns, sizes, strict=True):
+            artists[name].set_data_3d(*np.outer(side * along, [-_LEAST, far]))
+            place = _beyond(side * far * along, sight, size / sight.scale)
+            put_name(artists[f"{name} name"], place)
+        artists["one axis for all name"].set_text("one axis for all" if angle > 0 else "")
         said = {
             "matrix": _lines(R),
             "quaternion": numbers(rb.quaternion_from_matrix(R), 2),
@@ -70,6 +82,18 @@ def rotation_explorer() -> Explorer:
     return Explorer("An orientation", fig, artists, controls, show, plays="beta")
 
 
+def _beyond(end: rb.Array, sight: Sight, size: rb.Array) -> rb.Array:
+    """Return the place of a name of this size, beyond an end and, in this view, beside the box."""
+    plane = np.stack([sight.right, sight.up])
+    seen = plane @ end
+    far = float(np.linalg.norm(seen))
+    towards = seen / max(far, 1e-9)
+    slope = np.abs(towards)
+    beyond = max(far + min(size / 2 / np.maximum(slope, 1e-9)), _REACH + size / 2 @ slope)
+    place: rb.Array = end + (beyond - far) * towards @ plane
+    return place
+
+
 def projection_explorer() -> Explorer:
     """Return an explorer of a matrix that is not a rotation, and of two methods to repair it.
 
@@ -78,7 +102,7 @@ def projection_explorer() -> Explorer:
     the factor ``pull``, which the play button moves (BK 4, BK Prop. 2, RR 1.4).
     """
     with new_figure() as fig:
-        ax = new_space(fig, (-0.12, -0.08, 1.24, 1.24), 2.2)
+        ax = new_space(fig, (-0.4, -0.52, 1.71, 1.71), 2.2)
         artists = {
             **_axes_of(ax, "M", PALE, ls="-", lw=7, zorder=1),
             **_axes_of(ax, "nearest", ls="-", lw=3.5),
@@ -86,7 +110,7 @@ def projection_explorer() -> Explorer:
         }
         for name in ("M", "nearest", "Gram–Schmidt"):
             artists[f"{name} z"].set_label(name)
-        fig.legend(loc="lower left", ncols=3, handlelength=1.6, columnspacing=1)
+        fig.legend(loc="upper right", handlelength=1.6)
     controls = {
         "e12": widgets.slider("y leans", 0.8, -1.0, 1.0, 0.05),
         "e23": widgets.slider("z leans", 0.0, -1.0, 1.0, 0.05),
@@ -132,17 +156,17 @@ def random_explorer() -> Explorer:
     and its first ``number`` rotations are shown (RR 2, RR 2.1, RR 2.2).
     """
     with new_figure() as fig:
-        ax = fig.add_axes((-0.02, 0.0, 0.56, 1.0), projection="space")
+        ax = fig.add_axes((-0.01, -0.03, 0.56, 1.0), projection="space")
         draw_sphere(ax)
-        fig.text(0.26, 0.91, "images of e₁", ha="center")
+        fig.text(0.27, 0.92, "images of $e_1$", ha="center")
         pink = {"color": COLOURS["projection"]}
         artists: dict[str, Any] = {"points": new_line(ax, **pink, marker="o", ls="", ms=4, mew=0)}
-        side = fig.add_axes((0.62, 0.27, 0.36, 0.61))
-        side.set(xlim=(0, 3.2), ylim=(-1, 1), title="their heights")
-        side.set_xlabel("density\n(dashed: uniform)")
-        side.set_yticks([-1, -0.5, 0, 0.5, 1])
+        fig.text(0.27, 0.02, "pale: the far side", ha="center")
+        side = fig.add_axes((0.68, 0.18, 0.3, 0.73))
+        side.set(xlim=(0, 3.2), ylim=(-1, 1), xlabel="density", ylabel="their heights")
+        side.set(xticks=[0, 1, 2, 3], yticks=[-1, -0.5, 0, 0.5, 1])
         side.axvline(0.5, color="black", ls="--", lw=1.5)
-        fig.text(0.26, 0.02, "pale: the far side", ha="center")
+        side.text(0.35, 1.04, "uniform")
         steps: Any = {"orientation": "horizontal", "lw": 2, **pink}
         artists["histogram"] = side.stairs(np.zeros(20), _BINS, baseline=None, **steps)
     controls = {
@@ -179,8 +203,7 @@ def _axes_of(ax: Any, name: str, colour: str | None = None, **style: Any) -> dic
     for axis in "xyz":
         artists[f"{name} {axis}"] = new_line(ax, color=colour or COLOURS[axis], **style)
         if not colour and style["ls"] == "-":
-            centred = {"color": COLOURS[axis], "ha": "center", "va": "center"}
-            artists[f"{name} {axis} letter"] = ax.text(0, 0, 0, axis, **centred)
+            artists[f"{name} {axis} letter"] = new_name(ax, f"${axis}$", color=COLOURS[axis])
     return artists
 
 
@@ -188,7 +211,7 @@ def _move_axes(artists: dict[str, Any], name: str, M: rb.Array) -> None:
     for axis, column in zip("xyz", M.T, strict=True):
         artists[f"{name} {axis}"].set_data_3d(*np.outer(column, [0, 1]))
         if f"{name} {axis} letter" in artists:
-            artists[f"{name} {axis} letter"].set_position_3d(1.2 * column)
+            put_name(artists[f"{name} {axis} letter"], 1.2 * column)
 
 
 def _lines(M: rb.Array) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
+from rbclassroom.explorers.names import new_name, put_name
 from rbclassroom.explorers.paths import EDGES, POSES
 from rbclassroom.figures.lesson15 import highest_rates
 from rbcourse.draw.bodies import draw_box, move_box
@@ -29,14 +30,15 @@ def timing_explorer() -> Explorer:
     """
     path = rb.projected_spline_se3(np.arange(4.0), POSES)
     with new_figure() as fig:
-        space = new_space(fig, (-0.06, 0.08, 0.56, 0.9), 2.4)
+        space = new_space(fig, (-0.075, 0.03, 0.55, 0.89), 2.4)
         artists: dict[str, Any] = {
             "way": space.plot(*path(np.linspace(0, 3, 121))[:, :3, 3].T, color=COLOURS["path"])[0],
             "poses": space.plot(*POSES[:, :3, 3].T, "o", color=COLOURS["reference"])[0],
             "box": draw_box(space, POSES[0], EDGES),
         }
-        ax = fig.add_axes((0.53, 0.18, 0.45, 0.46))
-        ax.set(xlim=(0, 3), ylim=(0, _HIGHEST), xticks=[0, 1, 2, 3], xlabel="s", ylabel="rate ṡ")
+        ax = fig.add_axes((0.5, 0.18, 0.39, 0.71))
+        ax.set(xlim=(0, 3), ylim=(0, _HIGHEST), xlabel="$s$", ylabel=r"rate $\dot s$")
+        ax.set(xticks=[0, 1, 2, 3], yticks=[0, 0.5, 1, 1.5, 2])
         for knot in (1, 2):
             ax.axvline(knot, color=PALE, lw=1, ls=":")
         looks: dict[str, Any] = {
@@ -45,14 +47,18 @@ def timing_explorer() -> Explorer:
             "one rate": {"color": COLOURS["reference"], "lw": 1.5, "ls": "--"},
             "fastest": {"color": COLOURS["optimum"], "lw": 2.5},
         }
-        artists |= {name: new_line(ax, label=name, **look) for name, look in looks.items()}
+        artists |= {name: new_line(ax, **look) for name, look in looks.items()}
         artists["now"] = new_line(ax, color="black", marker="o", ls="", clip_on=False)
-        ax.legend(loc="lower right", bbox_to_anchor=(1.02, 1.0), handlelength=1.8)
+        ax.text(1.5, 1.04 * _HIGHEST, "acceleration limit", color=COLOURS["x"], ha="center")
+        ax.text(0.13, 0.03, "fastest")
+        artists["one rate name"] = new_name(ax, "one rate", color=COLOURS["reference"])
+        beside = {"color": COLOURS["z"], "ha": "left"}
+        artists["speed limits name"] = new_name(ax, "speed\nlimits", **beside)
     controls = {
         "angular_speed": widgets.slider("ω at most (rad/s)", 1.0, 0.5, 3.0, 0.1),
         "speed": widgets.slider("v at most (m/s)", 1.5, 0.5, 3.0, 0.1),
         "acceleration": widgets.slider("a at most (m/s²)", 2.0, 0.5, 6.0, 0.1),
-        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
+        "t": widgets.stepped("time t", 0.3, 0.0, 1.0, 0.01),
     }
 
     @lru_cache(maxsize=16)
@@ -71,6 +77,8 @@ def timing_explorer() -> Explorer:
         artists["acceleration limit"].set_data(s, highest["accelerations"])
         artists["speed limits"].set_data(s, highest["speeds"])
         artists["one rate"].set_data([0, 3], [rate, rate])
+        put_name(artists["one rate name"], [1.5, max(rate - 0.1, 0.08)])
+        put_name(artists["speed limits name"], [3.08, min(highest["speeds"][-1], _HIGHEST)])
         artists["fastest"].set_data(fastest.s, fastest.rate)
         here = fastest.progress(now)
         artists["now"].set_data([here[0]], [here[1]])

@@ -1,8 +1,11 @@
 """Figures of single lessons: each module has the tables, drawings and captions for a lesson."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from scipy.optimize import isotonic_regression
 
 from rbcourse import Array
 from rbcourse.draw.save import Table
@@ -35,3 +38,30 @@ def named(ending: str, data: Table) -> dict[str, Array]:
         for name, column in data.items()
         if name.endswith(ending)
     }
+
+
+def name_lines(ax: Axes, places: Mapping[str, tuple[float, float]], ha: str = "center") -> None:
+    """Write labels of lines at the given places, each in the colour of its line."""
+    colours = {str(line.get_label()): line.get_color() for line in ax.lines}
+    for name, (x, y) in places.items():
+        ax.text(x, y, name, color=colours[name], ha=ha, va="center")
+
+
+def name_ends(ax: Axes, gap: float = 0.1) -> None:
+    """Write the labels of lines beside their right ends, each in the colour of its line.
+
+    The labels are moved up or down as little as possible (least squares), until they are at least
+    `gap` apart, and at least half as far from the top and the bottom of the axes. The unit of `gap`
+    is the height of the axes.
+    """
+    ax.autoscale_view()
+    lines = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
+    maps = [line.get_transform() - ax.transAxes for line in lines]
+    xy = np.array([x.transform(line.get_xydata())[-1] for x, line in zip(maps, lines, strict=True)])
+    order, steps = np.argsort(xy[:, 1], kind="stable"), gap * np.arange(len(lines))
+    limits = gap / 2, 1 - gap / 2 - steps[-1]
+    xy[order, 1] = np.clip(isotonic_regression(xy[order, 1] - steps).x, *limits) + steps
+    style: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
+    for (x, y), line in zip(xy, lines, strict=True):
+        name, colour = str(line.get_label()), line.get_color()
+        ax.annotate(name, (x, y), (7, 0), color=colour, va="center", **style)

@@ -1,5 +1,6 @@
 """Lesson 3: angles of a motion, and turns of a box."""
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,20 +12,26 @@ from rbcourse import Array, pose_from_components
 from rbcourse.draw.bodies import draw_arrow, draw_box, set_turning
 from rbcourse.draw.save import COLOURS, Table
 
-_LOOKS = {"α": (COLOURS["z"], "-"), "β": (COLOURS["y"], "-."), "γ": (COLOURS["x"], "--")}
+_LOOKS = {
+    "α": (r"$\alpha$", COLOURS["z"], "-", (0.25, -90)),
+    "β": (r"$\beta$", COLOURS["y"], "-.", (0.85, -60)),
+    "γ": (r"$\gamma$", COLOURS["x"], "--", (0.4, 110)),
+}
+"""The name, the colour, the line style and the place of the name of each angle."""
 
 
 def draw_angles(axes: Sequence[Axes], data: Table) -> None:
     """Draw ZYX angles over time, each motion on its own axes (RR (8))."""
     for ax, (name, angles) in zip(axes, vectors("{} {} [rad]", data, "αβγ").items(), strict=True):
-        for k, (letter, (colour, dash)) in enumerate(_LOOKS.items()):
+        for k, (letter, (_, colour, dash, _)) in enumerate(_LOOKS.items()):
             degrees = np.degrees(angles[:, k])
             ax.plot(data["t [1]"], degrees, color=colour, ls=dash, label=letter)
-        ax.set(xlabel="time t", title=name, xlim=(0, 1))
+        ax.set(xlabel="time $t$", title=name, xlim=(0, 1))
         ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
         ax.set_yticks([-180, -90, 0, 90, 180])
     axes[0].set_ylabel("angle (degrees)")
-    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    for name, colour, _, place in _LOOKS.values():
+        axes[0].text(*place, name, color=colour, ha="center", va="center")
 
 
 def describe_angles(data: Table) -> str:
@@ -55,8 +62,9 @@ def draw_turns(axes: Sequence[Any], names: Sequence[str], R: Array) -> None:
         set_turning(ax, 1.3, zoom=1.4)
         for axis, direction in zip("xyz", turned.T, strict=True):
             draw_arrow(ax, np.zeros(3), 1.2 * direction, COLOURS[axis])
-            ax.text(*(1.45 * direction), axis, color=COLOURS[axis], ha="center", va="center")
-        ax.set_title(name)
+            look: Any = {"color": COLOURS[axis], "ha": "center", "va": "center"}
+            ax.text(*(1.54 * direction), f"${axis}$", **look)
+        ax.set_title(re.sub(r"\b([xyz])\b", r"$\1$", name))
 
 
 def describe_turns(names: Sequence[str], R: Array) -> str:

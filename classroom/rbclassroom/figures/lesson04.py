@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
-from rbclassroom.figures import columns, named
+from rbclassroom.figures import columns, name_lines, named
 from rbcourse import Array, orthonormalize_gram_schmidt, project_so
 from rbcourse.draw.save import COLOURS, PALE, Table
 
@@ -21,6 +21,7 @@ Repair = Callable[[Array], Array]
 
 _REPAIRS = {"nearest rotation": project_so, "Gram–Schmidt": orthonormalize_gram_schmidt}
 _COLOURS = {"nearest rotation": COLOURS["projection"], "Gram–Schmidt": COLOURS["z"]}
+_FORMULAS = {"M": "$M$", "U Vᵀ": r"$U V^{\!\top}$"}
 
 
 def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> Table:
@@ -52,12 +53,14 @@ def drift_table(steps: int, ways: Mapping[str, tuple[Array, Repair | None]]) -> 
 def draw_drift(ax: Axes, data: Table) -> None:
     """Draw the defects of a `drift_table` against the number of products."""
     (_, steps), *ways = named(" [1]", data).items()
-    looks = [(COLOURS["z"], "-"), (COLOURS["x"], "-."), (COLOURS["y"], "--")]
-    for (name, defect), (colour, dash) in zip(ways, looks, strict=True):
-        label = name.replace("ω̂", r"$\hat{ω}$")
-        ax.loglog(steps, defect, color=colour, ls=dash, label=label)
-    ax.set(xlabel="products", ylabel="defect ‖R$^T$R − I‖", xlim=(1, steps[-1]))
-    ax.legend()
+    looks = [("optimum", "-"), ("reference", "-."), ("projection", "--")]
+    names = [name.replace("I + hω̂", r"$I + h\hat{\omega}$") for name, _ in ways]
+    for name, (_, defect), (look, dash) in zip(names, ways, looks, strict=True):
+        ax.loglog(steps, defect, color=COLOURS[look], ls=dash, label=name)
+    ax.set(xlabel="products", ylabel=r"defect $\Vert R^{\!\!\top}\!R - I\Vert$")
+    ax.set(xlim=(1, steps[-1]), xticks=[1, 1e2, 1e4], yticks=[1e-6, 1e-3, 1, 1e3])
+    places = (1.5e4, 6e-3), (60, 0.5), (2e3, 3e-7)
+    name_lines(ax, dict(zip(names, places, strict=True)))
 
 
 def describe_drift(data: Table) -> str:
@@ -86,19 +89,19 @@ def draw_columns(axes: Sequence[Axes], matrices: Mapping[str, Array]) -> None:
     edge = 1.1 * max(1.0, *(np.hypot(*M).max() for M in matrices.values()))
     style: Any = {"angles": "xy", "scale_units": "xy", "scale": 1, "width": 0.025, "zorder": 3}
     for ax, (name, M) in zip(axes, matrices.items(), strict=True):
-        title = f"{name.replace('ᵀ', '$^T$')}\n{_sense(M)}"
+        title = f"{_FORMULAS.get(name, name)}\n{_sense(M)}"
         if M is not given:
             ax.quiver([0, 0], [0, 0], *given, color=PALE, **style)
             ax.plot(*np.stack([given, M], axis=1), color="black", ls=":", zorder=4)
             title += f", misses {np.linalg.norm(M - given):.2f}"
         ax.quiver([0, 0], [0, 0], *M, color=[COLOURS["x"], COLOURS["y"]], **style)
         ax.add_patch(Circle((0, 0), 1, fill=False, color=PALE, lw=1))
-        ax.set(aspect="equal", title=title, xlabel="x", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+        ax.set(aspect="equal", title=title, xlabel="$x$", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
         ax.set(xlim=(-edge, edge), ylim=(-edge, edge))
-    axes[0].set_ylabel("y")
+    axes[0].set_ylabel("$y$")
     (x, second_x), (y, second_y) = given
     axes[0].text(x / 2, y / 2, "first", color=COLOURS["x"], ha="right", va="bottom")
-    axes[0].text(second_x, second_y, " second", color=COLOURS["y"], va="top")
+    axes[0].text(second_x, second_y, "second  ", color=COLOURS["y"], ha="right", va="center")
 
 
 def describe_columns(matrices: Mapping[str, Array]) -> str:
@@ -147,8 +150,9 @@ def draw_shadows(axes: Sequence[Axes], points: Mapping[str, Array]) -> None:
         ax.plot(*ways.transpose(2, 0, 1), color=colour, lw=1.5)
         ax.plot(*ways[1].T, "o", ms=4, mfc="white", mec=colour)
         ax.plot(0, 0, "+", color="0.3", ms=9)
-        ax.set(aspect="equal", title=name, xlabel="(a + d)/2", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
-    axes[0].set_ylabel("(c − b)/2")
+        ax.set(aspect="equal", title=name, xlabel="$(a + d)/2$")
+        ax.set(xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+    axes[0].set_ylabel("$(c - b)/2$")
 
 
 def describe_shadows(points: Mapping[str, Array]) -> str:
@@ -185,8 +189,8 @@ def draw_frames(ax: Axes, data: Table) -> None:
     for (name, angle), dash in zip(found, ("-", "--"), strict=True):
         ax.plot(frame, np.degrees(angle), color=_COLOURS[name], ls=dash, label=name)
     ax.set(xlabel="the body frame is turned by (°)", ylabel="rotation found (°)")
-    ax.set(xlim=(frame[0], frame[-1]), xticks=np.arange(frame[0], frame[-1] + 1, 45))
-    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    ax.set(xlim=(frame[0], frame[-1]), xticks=np.arange(frame[0], frame[-1] + 1, 90))
+    name_lines(ax, {"nearest rotation": (155, 15), "Gram–Schmidt": (236, 28)})
 
 
 def describe_frames(data: Table) -> str:

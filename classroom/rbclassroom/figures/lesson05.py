@@ -61,11 +61,15 @@ def draw_histograms(axes: Sequence[Axes], bins: Bins) -> None:
             middle, density, color="black", ls="--", lw=1.5, label="density of uniform rotations"
         )
         ax.set_xticks(np.linspace(*limits, 3))
-        ax.set(xlabel=label, xlim=limits, ylim=(0, None))
+        ax.set(xlabel=label.replace("e₁", "$e_1$").replace("e₃", "$e_3$"), xlim=limits)
     axes[0].set_xticks([0, np.pi / 2, np.pi], ["0", "π/2", "π"])
+    for ax in axes:
+        ax.set_ylim(0)
     axes[0].set_ylabel("density")
-    handles, labels = axes[0].get_legend_handles_labels()
-    axes[0].figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    axes[0].locator_params(axis="y", nbins=4)
+    looks = ("projection", 0.2), ("z", 0.63), ("optimum", 0.85)
+    for name, (look, y) in zip([*densities, "dashed: exact"], looks, strict=True):
+        axes[1].text(0, y, name, color=COLOURS[look], ha="center", va="center")
 
 
 def describe_histograms(bins: Bins) -> str:

@@ -8,7 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Arc
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from rbclassroom.figures import columns
 from rbcourse import Array, angle_between
@@ -22,30 +24,45 @@ _MOTIONS: dict[str, dict[str, Any]] = {
     "geodesic": {"color": COLOURS["optimum"], "ls": "-", "ms": 11, "mfc": "none", **_MARKED},
     "projected line": {"color": COLOURS["projection"], "ls": "--", "ms": 7, **_MARKED},
 }
-_COLOURS = ListedColormap(plt.get_cmap("viridis_r")(np.linspace(0.4, 1, 256)))
+_COLOURS = ListedColormap(plt.get_cmap("viridis_r")(np.linspace(0.42, 1, 256)))
 """The colours of viridis without the bright end, which is hard to see on white."""
 _SHOWN: dict[float, Any] = {30: "-", 90: "--", 150: "-.", 165: ":"}
 """The angles in degrees whose curves `draw_family` draws, with their line styles."""
-_LABELS = {"t": "time t", "angle": "angle a", "theta": "θ"}
-_LABELS |= {"theta_dot": "dθ/dt", "f_dot": "df/dt"}
+_LABELS = {"t": "time $t$", "angle": "angle $a$", "theta": r"$\theta$", "f": "$f$"}
+_LABELS |= {"theta_dot": r"$d\theta/dt$", "f_dot": "$df/dt$"}
+_NAMED: dict[str, list[tuple[float, int, int, int]]] = {
+    r"$\theta$": [(0.21, -5, 5, 0), (0.33, 0, -13, 38), (0.72, 0, 0, 31), (0.6, -8, 4, 0)],
+    r"$d\theta/dt$": [(0.1, 0, 9, 0), (0.72, 5, 9, 0), (0.58, 7, 3, 0), (0.54, 7, 4, 0)],
+    "$f$": [(0.8, -5, 5, 0), (0.83, 0, -13, 38), (0.22, 0, 0, 25), (0.74, 5, -10, 0)],
+    "$df/dt$": [(1, 6, -5, 0), (1, 6, 5, 0), (1, 6, 0, 0), (1, 6, 0, 0)],
+}
+"""The name of each curve in `draw_family`: its time, its offset in points, and its slope.
+
+A name without an offset interrupts its curve.
+"""
 
 
 def draw_family(ax: Axes, data: Table) -> None:
     """Draw four curves from a table of angles, abscissas and values (BK Fig. 2, BK Fig. 3)."""
-    (p_label, p), (x_label, x), (y_label, y) = _columns(data)
-    for angle, dash in _SHOWN.items():
+    (_, p), (x_label, x), (y_label, y) = _columns(data)
+    for (angle, dash), (at, dx, dy, slope) in zip(_SHOWN.items(), _NAMED[y_label], strict=True):
         row = np.abs(p[:, 0] - np.radians(angle)).argmin()
-        look = {"color": _COLOURS(angle / 180), "ls": dash, "lw": 2.2, "label": f"{angle}°"}
-        ax.plot(x[row], y[row], **look)
-    ax.set(xlabel=x_label, ylabel=y_label, xlim=(x.min(), x.max()))
-    ax.legend(title=p_label, loc="center left", bbox_to_anchor=(1, 0.5), reverse=True)
+        name, colour = f"{angle}°", _colours(p[row, 0])
+        ax.plot(x[row], y[row], color=colour, ls=dash, lw=2.2, label=name)
+        look: Any = {"ha": ("right", "center", "left")[1 + np.sign(dx)], "va": "center"}
+        look |= {"color": colour, "rotation": slope, "textcoords": "offset points"}
+        look["path_effects"] = [withStroke(linewidth=4, foreground="white")]
+        text = f"$a = {angle}$°" if angle > 150 else f"${angle}$°"
+        ax.annotate(text, (at, np.interp(at, x[row], y[row])), (dx, dy), **look)
+    ax.set(xlabel=x_label, ylabel=y_label, xlim=(x.min(), x.max()), xticks=[0, 0.5, 1])
+    ax.yaxis.set_major_locator(MaxNLocator(3, steps=[1, 2, 5, 10]))
 
 
 def draw_surface(ax: Any, data: Table) -> None:
     """Draw the table of `draw_family` as a surface, in the same colours (BK Fig. 2, BK Fig. 3)."""
     (p_label, p), (x_label, x), (y_label, y) = _columns(data)
     mesh: Any = {"lw": 0.4, "edgecolor": (0, 0, 0, 0.25)}  # a transparent mesh
-    look = {"facecolors": _COLOURS(p / np.pi), "shade": False}
+    look = {"facecolors": _colours(p), "shade": False}
     ax.plot_surface(x, p, y, rcount=24, ccount=25, **look, **mesh)
     ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     ax.set_xlabel(x_label, labelpad=10)
@@ -68,8 +85,9 @@ def describe_family(data: Table) -> str:
         for which, row in (("smallest", 0), ("largest", -1))
     ]
     times = ", ".join(f"{value:g}" for value in x[0, at])
+    name = y_label.replace(r"\theta", "θ").strip("$")
     return (
-        f"{y_label} over the time t for {len(p)} angles a from {np.degrees(p[0, 0]):.4g}° to "
+        f"{name} over the time t for {len(p)} angles a from {np.degrees(p[0, 0]):.4g}° to "
         f"{np.degrees(p[-1, 0]):.4g}°, with a colour for each: a surface (left) and some of its "
         f"sections (right). At the times {times} {'; '.join(ends)}."
     )
@@ -85,10 +103,12 @@ def draw_chord(ax: Axes, data: Table) -> None:
     ax.plot(x, y, "s-", color=COLOURS["optimum"], ms=5, label=steps)
     ax.plot(*projected, "o", color=COLOURS["projection"], ms=8, label=marks)
     for k, offset in ((0, (-16, -22)), (len(x) // 2, (8, 8)), (-1, (-50, 6))):
-        ax.annotate(f"t = {t[k]:g}", (x[k], y[k]), offset, textcoords="offset points")
-    ax.set(aspect="equal", xlim=(-1.24, 1.12), ylim=(-0.16, 1.08))
+        ax.annotate(f"$t = {t[k]:g}$", (x[k], y[k]), offset, textcoords="offset points")
+    ax.text(-0.69, 0.05, "equal steps\non the chord", ha="center")
+    ax.text(0.57, 0.86, "projections\non the circle", color=COLOURS["projection"])
+    ax.set(aspect="equal", xlim=(-1.24, 1.12), ylim=(-0.16, 1.08), xticks=[-1, 0, 1], yticks=[0, 1])
     ax.set(xlabel="real part", ylabel="imaginary part")
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1))
+    ax.grid(False)
 
 
 def describe_chord(data: Table) -> str:
@@ -119,7 +139,7 @@ def draw_paths(ax: Any, paths: Mapping[str, Array]) -> None:
     way = paths["geodesic"]
     start, middle, end = way[[0, len(way) // 2, -1]]
     up = np.cross(start, end) / np.linalg.norm(np.cross(start, end))
-    for when, place in (("t = 0", start), ("t = 1", end)):
+    for when, place in (("$t = 0$", start), ("$t = 1$", end)):
         ax.text(*(0.72 * place + 0.12 * up), when, ha="center", va="center")
     x, y, z = up + middle / 2
     ax.view_init(elev=np.degrees(np.arctan2(z, np.hypot(x, y))), azim=np.degrees(np.arctan2(y, x)))
@@ -127,10 +147,11 @@ def draw_paths(ax: Any, paths: Mapping[str, Array]) -> None:
 
 def draw_speeds(ax: Axes, t: Array, speeds: Mapping[str, Array]) -> None:
     """Draw the angular speeds of the "geodesic" and the "projected line" over time."""
-    for name, style in _MOTIONS.items():
-        ax.plot(t, speeds[name], label=name, **style)
-    ax.set(xlabel="time t", ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
-    ax.legend()
+    for (name, style), (x, y) in zip(_MOTIONS.items(), ((0.03, 1.14), (0.57, 0.93)), strict=True):
+        ax.plot(t, speeds[name], label=name, clip_on=False, **style)
+        ax.text(x, y * speeds[name].max(), name, color=style["color"])
+    ax.set(xlabel="time $t$", ylabel=r"$\Vert\omega\Vert$ (rad per unit time)")
+    ax.set(xlim=(0, 1), ylim=(0, None), xticks=[0, 0.5, 1], yticks=[0, 2, 4, 6])
 
 
 def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> str:
@@ -152,6 +173,11 @@ def describe_paths(paths: Mapping[str, Array], speeds: Mapping[str, Array]) -> s
     )
 
 
+def _colours(angle: ArrayLike) -> Any:
+    """Return the colours of angles in rad; those of `_SHOWN` are equally far apart."""
+    return _COLOURS(np.interp(np.degrees(angle), list(_SHOWN), np.linspace(0, 1, len(_SHOWN))))
+
+
 def _columns(data: Table) -> list[tuple[str, Array]]:
     """Return the label and the values of each column."""
     plain = {name.split(" [")[0]: np.asarray(column, float) for name, column in data.items()}
@@ -165,13 +191,12 @@ def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> None:
     """
     d, R = poses[:, :3, 3], poses[:, :3, :3]
     draw_box(ax, poses[1], np.array([1.1, 0.8, 0.6])).set_alpha(0.5)
-    for name, point, origin, axes in zip(names, ("O", "O′"), d, R, strict=True):
-        draw_triad(ax, origin, axes, name)
-        ax.text(*(origin + axes @ [0, 0.75, 0.75]), f"{{{name}}}", ha="center", va="center")
+    for name, origin, axes in zip(names, d, R, strict=True):
+        draw_triad(ax, origin, axes, name, 1.17)
+        ax.text(*(origin + axes @ [0, 0.65, 0.65]), f"{{{name}}}", ha="center", va="center")
         ax.plot(*origin[:, None], "o", ms=5, color="black", zorder=OVER)
-        ax.text(*(origin - [-0.1, 0, 0.2]), point, ha="center", va="center", zorder=OVER)
     draw_arrow(ax, d[0], d[1] - d[0], color=COLOURS["reference"])
-    ax.text(*(d.mean(axis=0) - [0, 0, 0.15]), "d", ha="center", va="center")
+    ax.text(*(d.mean(axis=0) - [0, 0, -0.1]), "$d$", ha="center", va="center")
     ax.fit(d.min(axis=0) - 0.3, d.max(axis=0) + 1, zoom=1.95)
     ax.view_init(elev=30, azim=-75)
 
@@ -183,6 +208,6 @@ def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
     turn = np.degrees(angle_between(np.eye(3), poses[1, :3, :3]))
     return (
         f"The fixed frame {{{fixed}}} and the frame {{{moving}}} that moves with a body; d is the "
-        "vector from the origin O of the first to the origin O′ of the second. The body is a box. "
-        f"O′ is at ({place}) m, and the second frame is turned by {turn:.0f} degrees."
+        "vector from the origin of the first to the origin of the second. The body is a box. The "
+        f"second origin is at ({place}) m, and the second frame is turned by {turn:.0f} degrees."
     )

@@ -22,12 +22,16 @@ def spin_table(t: Array, spins: Mapping[str, Array]) -> Table:
 def draw_spins(axes: Sequence[Axes], t: Array, spins: Mapping[str, Array]) -> None:
     """Draw the components of angular velocities over time, each motion on its own axes."""
     for ax, (name, w) in zip(axes, spins.items(), strict=True):
-        for axis, number, part, dash in zip("xyz", "₁₂₃", w.T, ("-", "--", "-."), strict=True):
-            ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"ω{number}")
-        times = np.linspace(t[0], t[-1], 3)
-        ax.set(title=name, xlabel="time t", xlim=(t[0], t[-1]), xticks=times)
+        for axis, k, part, dash in zip("xyz", "123", w.T, ("-", "--", "-."), strict=True):
+            ax.plot(t, part, color=COLOURS[axis], ls=dash, label=f"w{k}")
+            i = (np.abs(part) > 0.97 * np.abs(part).max()).argmax()
+            if abs(part[i]) > 1:  # the small components have the same colours on the other axes
+                look: Any = {"color": COLOURS[axis], "textcoords": "offset points", "va": "center"}
+                side, look["ha"] = (15, "left") if part[i] > 0 else (-15, "right")
+                ax.annotate(rf"$\omega_{k}$", (t[i], part[i]), (side, -0.8 * side), **look)
+        times = np.linspace(t[0], t[-1], 5)[1:-1]
+        ax.set(title=name, xlabel="time $t$", xlim=(t[0], t[-1]), xticks=times, yticks=[-4, 0, 4])
     axes[0].set_ylabel("rad per unit time")
-    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
 
 
 def describe_spins(spins: Mapping[str, Array]) -> str:
@@ -72,9 +76,10 @@ def draw_momenta(ax: Any, directions: Array) -> None:
         axis, near_axis_2 = _course(path)
         look = "optimum" if near_axis_2 else "xyz"[axis]
         ax.plot(*path.T, color=COLOURS[look], lw=2)
-    for name, end in zip("123", np.diag([1.3, 1.1, 1.1]), strict=True):
+    looks = zip("123", np.diag([1.25, 1.04, 1.16]), ("x", "optimum", "z"), strict=True)
+    for name, end, look in looks:
         for place in (end, -end):
-            ax.text(*place, name, ha="center", va="center")
+            ax.text(*place, name, color=COLOURS[look], size=18, ha="center", va="center")
 
 
 def describe_momenta(directions: Array) -> str:
@@ -110,8 +115,8 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
     poses, edges = pose_from_components(R, np.zeros(3)), np.asarray(edges)
     reach = 0.5 * float(np.linalg.norm(edges))
     ax.plot([0, 0], [0, 0], [-1.2 * reach, 1.2 * reach], color=PALE, lw=1.5)
-    label = {"color": "0.45", "fontsize": 12, "ha": "right", "transform": ax.transAxes}
-    ax.text2D(0.98, 0.02, "angular\nmomentum", **label)
+    label = {"color": "0.45", "fontsize": 12, "transform": ax.transAxes}
+    ax.text2D(0.66, 0.02, "angular\nmomentum", **label)
     clock = ax.text2D(0.02, 0.02, "", transform=ax.transAxes)
     book = draw_box(ax, poses[0], edges)
     pin = ax.plot([], [], [], "o-", color=COLOURS["optimum"], markevery=[1], ms=9, lw=3)[0]
@@ -122,7 +127,7 @@ def moving_book(ax: Any, t: Array, R: Array, edges: ArrayLike) -> Callable[[int]
         move_box(book, poses[i], edges)
         ends = np.outer([0.5 * edges[1], 0.5 * edges[1] + 0.5 * reach], R[i, :, 1])
         pin.set_data_3d(*ends.T)
-        clock.set_text(f"t = {t[i]:.1f}")
+        clock.set_text(f"$t = {t[i]:.1f}$")
         return [book, pin, clock]
 
     return update
@@ -146,6 +151,8 @@ CARRIED = {
     "constant in the body": ("z", 1.0),
 }
 """The colours of three arrows on a turning body, and their turns as fractions of its turn."""
+_NAMED = (0.75, 0.72), (-1.0, 0.95), (-0.7, -1.08)
+"""Places of the names of these arrows, after half a turn."""
 
 
 def carried_table(turned: Array) -> dict[str, Array]:
@@ -168,11 +175,12 @@ def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
             ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
             head = (3, 0, np.degrees(np.arctan2(y, x)) - 90)
             ax.plot(x, y, marker=head, ms=12, color=COLOURS[colour])
-        ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.15), aspect="equal")
+        ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.35), aspect="equal")
         ax.set_title(f"turned by {np.degrees(angle):.0f}°")
         ax.set_axis_off()
-    handles, labels = axes[0].get_legend_handles_labels()
-    axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    for (name, (colour, _)), place in zip(CARRIED.items(), _NAMED, strict=True):
+        text = name.replace(" in", "\nin")
+        axes[-1].text(*place, text, color=COLOURS[colour], ha="center", linespacing=1)
 
 
 def describe_carried(turned: Array) -> str:

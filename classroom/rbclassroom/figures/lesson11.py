@@ -14,7 +14,7 @@ from rbcourse.draw.spheres import draw_sphere
 _SHARES = np.linspace(0, 1, 33)  # fractions of a leg at which points are drawn
 _LOOKS = (PALE, 2), ("0.35", 2), (COLOURS["optimum"], 3)
 """Colour and width of the legs between the points of each level."""
-_NAMES = {"plane": ["b₀", "b₁", "b₂", "b₃"], "sphere": ["R₀v", "B₁v", "B₂v", "R₁v"]}
+_NAMES = {"plane": ["b_0", "b_1", "b_2", "b_3"], "sphere": ["R_0v", "B_1v", "B_2v", "R_1v"]}
 
 
 def casteljau_table(
@@ -45,10 +45,11 @@ def moving_casteljau(
     text and, for each Axes, the legs of two levels, the curve so far, and its last point.
     """
     plane, sphere = axes
-    plane.set(title="in the plane", aspect="equal", adjustable="datalim", xmargin=0.15)
+    plane.set(aspect="equal", adjustable="datalim", xmargin=0.15)
     plane.set_axis_off()
     draw_sphere(sphere)
-    sphere.set_title("on SO(3), images of v", pad=18)
+    for ax, title in zip(axes, ("in the plane", "on SO(3), images of $v$"), strict=True):
+        ax.set_title(title, pad=12, size=16)
     panels = []
     constructions = _constructions(t, points, ends, v)
     for ax, (name, (levels, legs)) in zip(axes, constructions.items(), strict=True):
@@ -59,16 +60,16 @@ def moving_casteljau(
             lines += ax.plot(*leg[0].T, "o-", markevery=corners, **style)
         given = levels[0][0]
         outward = given - given.mean(axis=0)
-        outward *= 0.12 * np.ptp(given) / np.linalg.norm(outward, axis=-1, keepdims=True)
+        outward *= 0.15 * np.ptp(given) / np.linalg.norm(outward, axis=-1, keepdims=True)
         for word, place in zip(_NAMES[name], given + outward, strict=True):
-            ax.text(*place, word, ha="center", va="center", zorder=9, fontsize=16)
+            ax.text(*place, f"${word}$", ha="center", va="center", zorder=9, fontsize=16)
         lines += ax.plot(*levels[3][0].T, color=COLOURS["z"], lw=4, zorder=7)
         lines += ax.plot(*levels[3][0].T, "o", color=COLOURS["optimum"], ms=12, zorder=8)
         panels.append((levels[3][:, 0], legs[1:], lines[1:]))
     clock = plane.text(0.02, 0.02, "", transform=plane.transAxes, fontsize=16)
 
     def update(i: int) -> list[Any]:
-        clock.set_text(f"t = {t[i]:.2f}")
+        clock.set_text(f"$t = {t[i]:.2f}$")
         for drawn, legs, artists in panels:
             shown = *(leg[i] for leg in legs), drawn[: i + 1], drawn[i : i + 1]
             for artist, places in zip(artists, shown, strict=True):

@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from rbclassroom.figures import columns, vectors
+from rbclassroom.figures import columns, name_ends, name_lines, vectors
 from rbcourse import Array, Curve, geodesic_flow, log_so3, normal_cubic_so3
 from rbcourse.draw.save import COLOURS, Table
 
 LOOKS: dict[str, dict[str, Any]] = {
     "as if a ball": {"color": COLOURS["reference"], "ls": ":", "lw": 2.5},
-    "least acceleration": {"color": COLOURS["z"], "ls": "-"},
-    "least torque": {"color": COLOURS["x"], "ls": "--"},
+    "least acceleration": {"color": COLOURS["optimum"], "ls": "-"},
+    "least torque": {"color": COLOURS["screw"], "ls": "--"},
 }
-"""Three motions of a body, and the styles of their lines."""
+"""Three motions of a body, and the styles of their lines; no colour is that of an axis."""
 _SPEEDS = {"least jerk": ("optimum", "-"), "projected quintic": ("projection", "--")}
 
 
@@ -32,16 +32,24 @@ def torque_table(t: Array, curves: Mapping[str, Curve], inertia: Array) -> dict[
 
 
 def draw_torques(axes: Sequence[Axes], data: Table) -> None:
-    """Draw the components and the norm of each torque of a `torque_table`, one Axes per torque."""
+    """Draw the components and the norm of each torque of a `torque_table`, one Axes per torque.
+
+    The norm has the style of its motion in `LOOKS`.
+    """
+    norm = r"$\Vert\tau\Vert$"
     t, laws = data["t [s]"], vectors("{} {} [N m]", data)
     for ax, (law, torque) in zip(axes, laws.items(), strict=True):
         ax.axhline(0, color="0.8", lw=1, zorder=0)
         for axis, column, dash in zip("xyz", torque.T, ("-", "--", "-."), strict=True):
-            ax.plot(t, column, color=COLOURS[axis], ls=dash, label=f"about {axis}")
-        ax.plot(t, np.linalg.norm(torque, axis=-1), "k:", lw=2.5, label="‖τ‖")
-        ax.set(title=law, xlabel="time (s)", xticks=[0, 0.5, 1])
+            ax.plot(t, column, color=COLOURS[axis], ls=dash, lw=1.5, label=f"about ${axis}$")
+        ax.plot(t, np.linalg.norm(torque, axis=-1), label=norm, **LOOKS[law] | {"lw": 3.5})
+        ax.set_title(law, color=LOOKS[law]["color"])
+        ax.set(xlabel="time (s)", xlim=(0, 1), yticks=[-0.1, 0, 0.1])
+        ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     axes[0].set_ylabel("torque in body axes (N m)")
-    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    name_ends(axes[-1])
+    for ax in axes[:-1]:
+        name_lines(ax, {norm: (0.66, 0.09)})
 
 
 def describe_torques(data: Table) -> str:
@@ -67,8 +75,10 @@ def draw_speeds(ax: Axes, data: Table) -> None:
     """Draw a `speed_table` of two curves, the "least jerk" and the "projected quintic"."""
     for name, (colour, dash) in _SPEEDS.items():
         ax.plot(data["t [1]"], data[f"{name} [rad]"], label=name, color=COLOURS[colour], ls=dash)
-    ax.set(xlabel="time t", ylabel="‖ω‖ (rad per unit time)", xlim=(0, 1), ylim=(0, None))
-    ax.legend()
+    ax.set(xlabel="time $t$", xlim=(0, 1), ylim=(0, None))
+    ax.set(ylabel=r"$\Vert\omega\Vert$ (rad per unit time)", yticks=[0, 5, 10, 15])
+    ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+    name_lines(ax, {"projected quintic": (0.58, 13.5), "least jerk": (0.66, 5.5)}, ha="left")
 
 
 def describe_speeds(data: Table) -> str:
@@ -78,10 +88,7 @@ def describe_speeds(data: Table) -> str:
 
 
 _FREE = "{} {} [rad]"
-_COORDINATES = {
-    "exponential coordinates": "y = log(R₀$^T$R)",
-    "normal coordinates": "x, to second order",
-}
+_COORDINATES = "exponential coordinates", "normal coordinates"
 
 
 def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
@@ -102,22 +109,25 @@ def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
 
 
 def draw_normal(axes: Sequence[Axes], data: Table) -> None:
-    """Draw the motions and lines of a `normal_table`, each kind of coordinates on its own axes."""
+    """Draw the motions and lines of a `normal_table`, each kind of coordinates on its own axes.
+
+    The motions have dots at half time and at the end.
+    """
     lines, *kinds = _by_kind(data).items()
     for ax, (kind, motions) in zip(axes, kinds, strict=True):
         for k, line in enumerate(lines[1]):
-            ax.plot(*line.T, color=COLOURS["path"], ls=":", label="" if k else "straight line")
+            ax.plot(*line.T, color=COLOURS["reference"], ls=":", label="" if k else "straight line")
         look: dict[str, Any] = {"color": COLOURS["optimum"], "marker": "o", "ms": 5}
         middle = len(motions[0]) // 2
         for k, motion in enumerate(motions):
-            label = "" if k else "free motion, with dots at half time and at the end"
+            label = "" if k else "free motion"
             ax.plot(*motion.T, markevery=[middle, -1], label=label, **look)
-        reach = 1.1 * np.abs([lines[1], motions]).max()
-        ax.set(title=f"{kind}\n{_COORDINATES[kind]}", xlabel="about x (rad)", aspect="equal")
-        ax.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=[-1, 0, 1], yticks=[-1, 0, 1])
-    axes[0].set_ylabel("about y (rad)")
-    handles, labels = axes[0].get_legend_handles_labels()
-    axes[0].figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        reach, ticks = 1.05 * np.abs([lines[1], motions]).max(), [-0.5, 0, 0.5]
+        ax.set(title=kind, xlabel="about $x$ (rad)", aspect="equal")
+        ax.set(xlim=(-reach, reach), ylim=(-reach, reach), xticks=ticks, yticks=ticks)
+    axes[0].set_ylabel("about $y$ (rad)")
+    names = axes[0].get_legend_handles_labels()
+    axes[0].figure.legend(*names, loc="outside lower center", ncols=2)
 
 
 def describe_normal(data: Table) -> str:

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 import rbcourse as rb
-from rbclassroom.figures import named
+from rbclassroom.figures import name_ends, named
 from rbcourse import Array, Curve
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
@@ -36,8 +36,8 @@ _CURVES: dict[str, dict[str, Any]] = {
 _CLOCK = np.array([0, 1, 1 + 2**0.5])
 _ANGLES = np.array([0, 1, 0.3])
 _TURNS: list[dict[str, Any]] = [
-    {"color": COLOURS["z"], "ls": "-."},
-    {"color": COLOURS["projection"], "ls": "--"},
+    {"color": COLOURS["y"], "ls": "-."},
+    {"color": COLOURS["screw"], "ls": "--"},
     {"color": COLOURS["optimum"], "ls": "-"},
 ]
 
@@ -108,8 +108,9 @@ def draw_accelerations(ax: Axes, data: Table, knots: ArrayLike) -> None:
     for name, _, values in _profiles(data):
         ax.plot(data[_TIME], values, label=name, **_CURVES[name])
     t = np.asarray(data[_TIME])
-    ax.set(xlabel="time (s)", ylabel="ω′ about one axis (rad/s²)", xlim=(t[0], t[-1]))
-    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    ax.set(xlabel="time (s)", ylabel=r"$\omega'$ about one axis (rad/s²)", xlim=(t[0], t[-1]))
+    ax.set(xticks=range(5), yticks=[-2, 0, 2])
+    name_ends(ax)
 
 
 def describe_accelerations(data: Table, knots: ArrayLike) -> str:
@@ -151,9 +152,11 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
     for (name, bend), look in zip(named(" bend [rad]", data).items(), _TURNS, strict=True):
         for ax, values in zip(axes, (data[f"{name} [rad]"], bend), strict=True):
             ax.plot(t, values, label=name, **look)
-    axes[0].set(xlabel="time (s)", ylabel="angle θ (rad)", ylim=(low, high))
-    axes[1].set(xlabel="time (s)", ylabel="θ less the straight line (rad)")
-    axes[1].legend(loc="center", bbox_to_anchor=(0.47, 0.52))
+    axes[0].set(ylabel=r"angle $\theta$ (rad)", ylim=(low, high), yticks=[0, 20, 40, 60])
+    axes[1].set(ylabel=r"$\theta$ less the straight line (rad)", yticks=[0, 0.4, 0.8])
+    for ax in axes:
+        ax.set(xlabel="time (s)", xticks=[0, 1, 2])
+    name_ends(axes[0])
 
 
 def describe_turns(data: Table) -> str:
@@ -211,8 +214,11 @@ def draw_excesses(ax: Axes, data: Table) -> None:
         ax.loglog(ticks, values, label=name, **EXCESSES[name])
     ax.set(xlabel="turn of a leg (°)", ylabel="excess over the optimum")
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
+    powers = [-7, -5, -3, -1]
+    names = [rf"$\mathregular{{10^{{{power + 2}}}}}$ %" for power in powers]
+    ax.set_yticks(np.power(10.0, powers), names)
     ax.minorticks_off()
-    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    name_ends(ax)
 
 
 def describe_excesses(data: Table) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from rbclassroom.figures import named
+from rbclassroom.figures import name_lines, named
 from rbclassroom.figures.lesson14 import profile_table
 from rbcourse import Array, Curve, Timed
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
@@ -93,9 +93,10 @@ def draw_phase_plane(ax: Axes, data: Table, knots: ArrayLike) -> None:
         ax.axvline(knot, color=PALE, lw=1, ls=":")
     for (name, look), rate in zip(_LOOKS.items(), columns, strict=True):
         ax.plot(s, rate, **{"label": name, **look})
-    ax.set(xlabel="path parameter s (s)", ylabel="rate ṡ", xlim=(s[0], s[-1]))
-    ax.set_ylim(0, 2 * np.max(columns[-1]))
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+    ax.set(xlabel="path parameter $s$ (s)", ylabel=r"rate $\dot s$", xlim=(s[0], s[-1]))
+    ax.set(ylim=(0, 2 * np.max(columns[-1])), xticks=range(4), yticks=[0, 0.5, 1, 1.5])
+    name_lines(ax, {"limit of speeds": (0.95, 1.06), "limit of accelerations": (2.1, 1.32)})
+    name_lines(ax, {"one rate": (1.5, 0.38), "fastest": (0.2, 0.2)})
 
 
 def describe_phase_plane(data: Table) -> str:
@@ -130,8 +131,9 @@ def draw_shares(ax: Axes, data: Table) -> None:
     for label, share in named(" [1]", data).items():
         ax.plot(t, share, label=label, **_SHARES[label.replace(" ", "_")])
     ax.axhline(1, color=PALE, lw=1, zorder=0)
-    ax.set(xlabel="time (s)", ylabel="share of the limit", ylim=(0, 1.08), xlim=(t[0], t[-1]))
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+    ax.set(xlabel="time (s)", ylabel="share of the limit", ylim=(0, 1.02), xlim=(t[0], t[-1]))
+    ax.set_yticks([0, 0.5, 1], ["0", "0.5", "1"])
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, columnspacing=1.2)
 
 
 def describe_shares(data: Table) -> str:
@@ -169,9 +171,11 @@ def draw_passes(ax: Axes, data: Table) -> None:
     ax.plot(s, both, color=COLOURS["optimum"], lw=2.5, marker="o", label="then from the start")
     for place, x in zip(s, both, strict=True):
         ax.annotate(f"{x:g}", (place, x), (0, -18), textcoords="offset points", ha="center")
-    ax.set(xlabel="place s (m)", ylabel="x = ṡ² (m²/s²)", ylim=(-0.8, np.max(highest) * 1.1))
-    ax.set_xticks(s)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3)
+    ax.set(xlabel="place $s$ (m)", ylabel=r"$x = \dot s^2$ (m²/s²)")
+    ax.set_ylim(-0.8, np.max(highest) * 1.1)
+    ax.set_xticks(s, [f"{place:g}" for place in s])
+    name_lines(ax, {"speed limit": (1.2, 4), "from the end": (0.6, 3.1)}, ha="left")
+    name_lines(ax, {"then from the start": (2, 1.5)})
 
 
 def describe_passes(data: Table) -> str:

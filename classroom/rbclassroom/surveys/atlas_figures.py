@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
+from rbclassroom.figures import name_ends, name_lines
 from rbclassroom.surveys.atlas import CELLS, FASTEST, WAYS
 from rbcourse import Array
 from rbcourse.draw.save import COLOURS, Table
@@ -22,9 +23,12 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "cumulative": ("y", "v"),
     "quaternion": ("screw", "D"),
     "Cayley": ("reference", "x"),
-    "weighted": ("path", "p"),
-    "normal": ("optimum", "*"),
+    "normal": ("y", "*"),
 }
+_OF_BODY = {"weighted": ("z", "p"), "Bézier": ("reference", "^")}
+"""Other looks of curves in figures with the weighted projection, as in the sketches."""
+_DASHES = ("white", 5, "-"), ("black", 3, "--")
+"""Colour, width and style of two lines, which together mark 10 % on every colour."""
 _SUM = "least sum of the two\nsmallest singular values (rotation: 2)"
 _NORM = "least norm\nof the cubic (rotation: 1)"
 _MARGINS = {"projection": (_SUM, [0.01, 0.1, 1, 2]), "quaternion": (_NORM, [0.5, 1])}
@@ -56,8 +60,9 @@ def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> None:
     for ax, way in zip(axes[axes != corner], WAYS, strict=True):
         drawn = _heat_map(ax, way, cells[f"{way} excess [1]"])
     corner.set_axis_off()
-    bar = fig.colorbar(drawn, cax=corner.inset_axes((0.1, 0, 0.1, 1)))
-    _label(fig, bar, f"{family} the axis", quantile)
+    corner.set_title(f"excess, {quantile}")
+    bar = fig.colorbar(drawn, cax=corner.inset_axes((0.3, -0.12, 0.08, 1.12)))
+    _label(fig, bar, f", {family} the axis")
 
 
 def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None:
@@ -69,11 +74,13 @@ def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None
     bodies = _groups(data, "body")
     axes = fig.subplots(len(bodies), len(curves), sharex=True, sharey=True, squeeze=False)
     for row, (body, cells) in zip(axes, bodies.items(), strict=True):
-        row[0].set_ylabel(body)
+        row[0].set_ylabel(body if len(bodies) > 1 else "")
         for ax, (curve, title) in zip(row, curves.items(), strict=True):
             heading = title if ax in axes[0] else ""
             drawn = _heat_map(ax, heading, cells[f"{curve} median [1]"])
-    _label(fig, fig.colorbar(drawn, ax=axes, aspect=25), "in any direction", "median")
+    bar = fig.colorbar(drawn, ax=axes, fraction=0.025, pad=0.02)
+    bar.ax.set_title("median\nexcess", loc="left")
+    _label(fig, bar)
 
 
 def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
@@ -102,21 +109,25 @@ def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
     drawn = ax.pcolormesh(turns, speeds, excess, norm=norm, cmap="viridis_r")
     if np.nanmin(excess) < _TENTH < np.nanmax(excess):
         powers = np.log10(np.maximum(excess, min(_LEVELS)))
-        line: Any = {"linestyles": "--", "linewidths": 2.5, "colors": "black"}
-        ax.contour(x, y, powers, [np.log10(_TENTH)], **line)
+        for colour, width, dash in _DASHES:
+            line: Any = {"colors": colour, "linewidths": width, "linestyles": dash}
+            ax.contour(x, y, powers, [np.log10(_TENTH)], **line)
     if np.max(excess) < min(_LEVELS):
         said = f"< {_percents(_LEVELS)[0]}\neverywhere"
         ax.text(0.5, 0.5, said, transform=ax.transAxes, ha="center", va="center")
-    ax.set(title=title, xticks=[0, 60, 120, 180], yticks=[0, 3, 6, 9])
+    ax.set(title=title, xticks=[0, 90, 180], yticks=[0, 3, 6, 9])
+    for tick, side in zip(ax.xaxis.get_major_ticks(), ("left", "center", "right"), strict=True):
+        tick.label1.set(ha=side)  # the labels of neighbouring maps stay apart
     return drawn
 
 
-def _label(fig: Figure, bar: Any, ways: str, quantile: str) -> None:
-    fig.supylabel(f"end velocity, {ways} (rad)", fontsize="medium")
+def _label(fig: Figure, bar: Any, ways: str = "") -> None:
+    fig.supylabel(f"end velocity{ways} (rad)", fontsize="medium")
     fig.supxlabel("displacement (°)", fontsize="medium")
-    bar.set_label(f"cost / optimum − 1,\n{quantile}")
-    bar.set_ticks(_LEVELS, labels=_percents(_LEVELS))
-    bar.ax.axhline(_TENTH, color="black", lw=2.5, ls="--")
+    levels = sorted({*_LEVELS[::2], _TENTH})
+    bar.set_ticks(levels, labels=_percents(levels))
+    for colour, width, dash in _DASHES:
+        bar.ax.axhline(_TENTH, color=colour, lw=width, ls=dash)
 
 
 def _set_percents(ax: Axes, levels: list[float]) -> None:
@@ -128,7 +139,7 @@ def _percents(levels: list[float]) -> list[str]:
     """Return levels as text in percent; if any is far from 1 %, write all as powers of ten."""
     powers = np.log10(levels).round().astype(int) + 2
     if np.abs(powers).max() > 4:
-        return [f"$10^{{{power}}}$ %" for power in powers]
+        return [rf"$\mathregular{{10^{{{power}}}}}$ %" for power in powers]
     return [f"{100 * level:,.9g} %" for level in levels]
 
 
@@ -149,23 +160,30 @@ def _shares(excess: Array, levels: Sequence[float]) -> str:
     return ", ".join(f"{100 * np.mean(excess < level):.0f}" for level in levels)
 
 
-def draw_growth(ax: Axes, data: Table) -> None:
-    """Draw, on logarithmic axes, the excess of each closed form against the excursion.
+def draw_growth(ax: Axes, data: Table, slopes: Mapping[int, float]) -> None:
+    """Draw, on logarithmic axes, the median excess of each closed form against the excursion.
 
-    The medians have marks; the 90 % quantiles are thin dashed lines (BK 1, BK 7).
+    `slopes` maps the slopes of thin grey lines, up to a size of 1, to their lowest values
+    (BK 1, BK 7).
     """
     size, medians = np.asarray(data["size [rad]"]), _medians(data)
+    looks = _LOOKS | (_OF_BODY if "weighted" in medians else {})
     for way, median in medians.items():
-        colour, mark = _LOOKS[way]
+        colour, mark = looks[way]
         ax.plot(size, median, "-", marker=mark, ms=8, label=way, color=COLOURS[colour])
-        ax.plot(size, data[f"{way} 90 % excess [1]"], "--", lw=1, color=COLOURS[colour])
-    ax.set(xscale="log", yscale="log", xlabel="size s of the excursion (rad)")
+    ax.set(xscale="log", yscale="log", ymargin=0.1, xlabel="size $s$ of the excursion (rad)")
+    x, grey = np.array([size[0], 0.5, 1]), COLOURS["reference"]
+    for slope, low in slopes.items():
+        y = low * (x / x[0]) ** slope
+        ax.plot(x, y, ":", lw=1.5, color=grey)
+        above = low > max(median[0] for median in medians.values())
+        ha, va = ("right", "bottom") if above else ("left", "top")
+        ax.text(x[1], y[1], f" slope {slope} ", color=grey, ha=ha, va=va)
     ax.set_xticks(size, [f"{s:g}" for s in size], minor=False)
     ax.minorticks_off()
     lowest = min(np.nanmin(median) for median in medians.values())
     _set_percents(ax, [x for x in [1e-12, 1e-10, 1e-8, 1e-6, *_LEVELS[::2]] if x > lowest / 30])
-    ax.plot([], [], "--", lw=1, color="black", label="90 % quantile")
-    ax.legend(loc="center left", bbox_to_anchor=(1, 0.5))
+    name_ends(ax, 0.07)
 
 
 def describe_growth(data: Table) -> str:
@@ -176,15 +194,14 @@ def describe_growth(data: Table) -> str:
         for way, x in _medians(data).items()
     )
     return (
-        "Cost of closed forms over the optimum minus 1, over the size of the excursion: median and "
-        "90 % quantile. Both axes are logarithmic. While the size grows from "
-        f"{size[0]:g} to {size[-1]:g} rad, the median of the cost over the optimum minus 1 grows: "
-        f"{said}."
+        "Cost of closed forms over the optimum minus 1, over the size of the excursion: medians. "
+        f"Both axes are logarithmic. While the size grows from {size[0]:g} to {size[-1]:g} rad, "
+        f"the median of the cost over the optimum minus 1 grows: {said}."
     )
 
 
 def _medians(data: Table) -> dict[str, Array]:
-    columns = {way: f"{way} median excess [1]" for way in _LOOKS}
+    columns = {way: f"{way} median excess [1]" for way in _LOOKS | _OF_BODY}
     return {way: np.asarray(data[column]) for way, column in columns.items() if column in data}
 
 
@@ -237,7 +254,7 @@ def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
 
     `data` has the time, and columns "NAME d [1]" and "NAME e [1]" for each form (beyond BK 10).
     """
-    titles = {"d": "difference d, across the axis", "e": "mean e, across the axis"}
+    titles = {"d": "difference $d$, across the axis", "e": "mean $e$, across the axis"}
     for ax, (letter, title) in zip(axes, titles.items(), strict=True):
         for name in (name for name in data if name.endswith(f" {letter} [1]")):
             way = name.removesuffix(f" {letter} [1]")
@@ -245,9 +262,12 @@ def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
             style: Any = {"color": COLOURS[colour], "marker": mark, "markevery": 10}
             ax.plot(data["t [1]"], data[name], label=way, **style)
         ax.axhline(0, color="0.8", lw=1, zorder=0)
-        ax.set(title=title, xlabel="time t", xticks=[0, 0.5, 1])
-    axes[0].set_ylabel("deviation / (‖σ‖² ‖d or e‖)")
-    axes[-1].legend(loc="center left", bbox_to_anchor=(1, 0.5))
+        ax.set(title=title, xlabel="time $t$", ylim=(-0.0068, 0.0068), yticks=[-0.004, 0, 0.004])
+        ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+    axes[0].set_ylabel(r"deviation / ($\Vert\sigma\Vert^2\,\Vert d$ or $e\Vert$)")
+    places = {"projection": (0.5, 0.006), "quaternion": (0.5, 0.0023), "Bézier": (0.5, -0.0009)}
+    name_lines(axes[0], places)
+    name_lines(axes[1], {"exponential": (0.5, -0.0061)})
 
 
 def describe_deviations(data: Table) -> str:

@@ -94,12 +94,13 @@ def test_no_poll_answer_is_visible_before_a_slider_is_moved():
     # the links lie on the pale links
     assert off(points(arm.artists["links"].axes.lines[0]), links) < 1e-15
     assert np.ptp(way, axis=0).max() < 1e-15
+    assert made("spline")._first["t"] < 1  # the first jump is at 1 s
     plan.put(t=4.0)
     assert off(*(points(plan.artists[f"{frame} way"]) for frame in ("world", "body"))) < 1e-15
 
 
 AXES = {"the diagonal x + y + z": [1, 1, 1], "x,": [1, 0, 0], "y,": [0, 1, 0], "z,": [0, 0, 1]}
-PANELS = {"as if a ball": (-15, 202), "least acceleration": (172, 389), "least torque": (359, 576)}
+PANELS = {"as if a ball": (-5, 192), "least acceleration": (182, 379), "least torque": (368, 565)}
 
 
 @cache
@@ -117,18 +118,18 @@ def turned_books(about, turn, thickness):
 
 @pytest.mark.source("beyond BK 3", "beyond BK 4")
 def test_the_three_books_agree_with_the_package():
-    for v, said, artists in sweep("body", thickness=30.0, t=0.4):
+    for v, said, artists in sweep("body", thickness=15.0, t=0.4):
         curves, G, costs = turned_books(v["about"], v["turn"], v["thickness"])
         half = 4.2 * np.array([0.3, 0.2, v["thickness"] / 100]) / 2
         for (law, panel), curve in zip(PANELS.items(), curves, strict=True):
             assert_box(artists[law], curve(v["t"]), half)
-            assert_seen(artists[law].axes, artists[law].corners, panel, (150, 350))
+            assert_seen(artists[law].axes, artists[law].corners, panel, (184, 354))
             t, torque = points(artists[f"{law} torque"]).T
             inner, h = t[1:-1], 1e-5
             w, rate = curve(inner, 1), (curve(inner + h, 1) - curve(inner - h, 1)) / (2 * h)
             want = np.linalg.norm(rate @ G + np.cross(w, w @ G), axis=-1)
             assert off(torque[1:-1], want) < 1e-6
-            assert torque.max() < 0.3
+            assert torque.max() < 0.2
         for name, ratios in zip(("acceleration", "torque"), costs, strict=True):
             assert reads(said[name], ratios)
 
@@ -152,6 +153,9 @@ def test_the_projected_line_agrees_with_the_package():
         }
         for name, places in wanted.items():
             assert off(points(artists[name]) @ [1, 1j], places) < 1e-14, name
+        right = artists["line name"].get_position() @ np.array([1, 1j]) - last
+        assert 0 < right.real < 0.1
+        assert -0.1 < right.imag < 0
         known = f.theta(now, a), f.theta(now, a, 1), abs(on)
         assert reads(" ".join(said.values()), known)
 
@@ -170,9 +174,13 @@ def test_the_screw_and_the_geodesic_agree_with_the_package():
             assert_box(artists[name], pose[:3, :3], 0.4, pose[:3, 3], turned=1e-7, placed=1e-12)
             assert_seen(artists[name].axes, artists[name].corners, (0, 560), (0, 380))
             if name != "goal":
+                apart = artists[f"{name} name"].get_position_3d() - pose[:3, 3]
+                assert off(np.abs(apart), [0, 0, 0.75]) < 1e-12
                 way = points(artists[f"{name} way"])
                 assert off(way[[0, -1]], [[0, 0, 0], pose[:3, 3]]) < 1e-12
                 assert reads(said[f"turned, {name}"], v["t"] * angle)
+        heights = [artists[f"{name} name"].get_position_3d()[2] for name in ("geodesic", "screw")]
+        assert np.abs(np.diff(heights)) > 1.5 - 1e-9  # the names do not overlap
         assert reads(said["origins apart"], np.linalg.norm(along[:3, 3] - geodesic[:3, 3]))
         if 0 < angle < 180:
             axis = points(artists["axis"])
@@ -279,8 +287,8 @@ def test_the_optimum_and_its_rivals_agree_with_the_package():
             if v["rival"] != "Cayley" or name != "rival":  # Cayley's curve may leave the picture
                 # the curve never jumps across the ball of radius π
                 assert np.abs(np.diff(drawn, axis=0)).max() < 0.5
-                assert_within(drawn, *[artists["σ₁"].axes.get_ylim()] * 3)
-        heights = [artists[f"σ{number}"].get_position()[1] for number in "₁₂₃"]
+                assert_within(drawn, *[artists["sigma1"].axes.get_ylim()] * 3)
+        heights = [artists[f"sigma{i}"].get_position()[1] for i in (1, 2, 3)]
         assert min(np.diff(heights)) > 0.25  # the labels do not overlap
         if v["size"] >= 0.5:
             assert off(heights, sigma) < 1e-15
@@ -294,6 +302,8 @@ def test_both_cubes_agree_with_the_package():
         ends = np.eye(4), A1, [1, 2, 3], [2, 1, v["spin"]], [1, 1, 1], [1, 5, v["rise"]]
         curves, costs = solved(rb.minimum_acceleration_se3, rb.projected_cubic_se3, ends)
         assert_compared(said, curves, costs, v["t"])
+        under = artists["difference name"].get_position_3d()
+        assert off(under, curves[0](v["t"])[:3, 3] - [0, 0, 3.6]) < 1e-11
         for name, left, curve in zip(("optimum", "projection"), (0, 280), curves, strict=True):
             boxes = {name: curve(v["t"]), f"{name} goal": A1, "difference": curves[0](v["t"])}
             for box, A in boxes.items():
@@ -406,6 +416,7 @@ def test_the_timing_stays_below_the_limits_of_its_path():
         highest = points(artists["acceleration limit"])[:, 1]
         assert off(highest**2 * bend / v["acceleration"], 1) < 1e-9
         rate = points(artists["one rate"])[0, 1]
+        assert rate - 0.11 < artists["one rate name"].get_position()[1] < max(rate, 0.1)
         used = rb.limits_used(rb.retime(path, 3 / rate), **limits).values()
         assert max(share for share, _ in used) == pytest.approx(1)
         now = v["t"] * c.domain[1]
@@ -426,6 +437,7 @@ def planned(v, t, frame):
 @pytest.mark.source("RR (17)", "RR (18)", "RR (19)")
 def test_both_bodies_are_at_the_poses_of_the_plan():
     for v, said, artists in sweep("planar", omega1=45.0, t=4.0):
+        names = []
         for frame in ("world", "body"):
             x, y, theta = planned(v, v["t"], frame)
             way, plan = (points(artists[f"{frame} {name}"]) for name in ("way", "plan"))
@@ -437,6 +449,9 @@ def test_both_bodies_are_at_the_poses_of_the_plan():
             assert off(outline.mean(axis=0), [x, y]) < 1e-12
             assert off(outline[1] - outline[0], [1.3 * np.cos(theta), 1.3 * np.sin(theta)]) < 1e-12
             assert reads(said[frame], [x, y, np.degrees(theta)])
+            names.append(artists[f"{frame} name"].get_position())
+            assert off(names[-1], [x, y]) < 1.25
+        assert np.abs(np.subtract(*names)).max() > 0.9  # the names do not overlap
 
 
 def test_a_plan_of_two_fast_commands_stays_in_the_picture():
@@ -457,6 +472,10 @@ def test_the_arm_agrees_with_the_package():
         joints, way = rb.arm.arm_forward_kinematics(q).joints, points(artists["way"])
         assert off(points(artists["links"]), joints) < 1e-14
         assert off(points(artists["goal"])[0], hand(goal)) < 1e-14
+        ahead = joints[-1] - joints[-2]
+        place = joints[-1] + [0.5, 0.3] * ahead
+        assert off(artists["hand name"].get_position(), place) < 0.02  # by whole pixels
+        assert 0.4 < off(artists["goal name"].get_position(), hand(goal)) < 0.8
         middle = hand((START + q) / 2)
         assert off(way[[0, len(way) // 2, -1]], [hand(START), middle, joints[-1]]) < 1e-14
         assert reads(said["angles"], np.degrees(q))
@@ -491,6 +510,20 @@ def tips(explorer, name):
     return lines[:, 1].T
 
 
+def assert_beside(name, axis, box):
+    """Check that a name is near the end of an axis and, in the first view, beside the box."""
+    sight, end = name.axes.sight(), points(axis)[1]
+    far, tip, *corners = (
+        (sight.scale * np.stack([sight.right, sight.up]) @ place)
+        for place in (name.get_position_3d(), end, *box.corners.reshape(-1, 3))
+    )
+    half, towards = name.get_window_extent().size / 2, far / np.linalg.norm(far)
+    assert off(towards @ tip, np.linalg.norm(tip)) < 1e-6
+    assert (corners @ towards).max() < far @ towards - half @ np.abs(towards)
+    for corner in (-half, half):
+        assert_within([sight.origin + far + corner], (0, 561), (0, 381))
+
+
 @pytest.mark.source("RR (7)", "RR (8)", "RR 2.1")
 def test_the_drawn_box_agrees_with_the_angles():
     orientation, (x, y, z) = made("rotation"), np.eye(3)
@@ -502,10 +535,13 @@ def test_the_drawn_box_agrees_with_the_angles():
         turns = {"first turn": z, "second turn": rb.exp_so3(alpha * z) @ y, "third turn": R @ x}
         for name, axis in turns.items():
             assert np.abs(np.cross(points(artists[name]), axis)).max() < 1e-14
-        one, angle = points(artists["axis"]), np.linalg.norm(rb.log_so3(R))
+        one, angle = points(artists["one axis for all"]), np.linalg.norm(rb.log_so3(R))
         # near half-turns, half of the digits of the axis are lost
         assert off(one @ R.T, one) < 1e-8
-        assert one.any() == (angle > 1e-9)
+        shown = bool(artists["one axis for all name"].get_text())
+        assert one.any() == shown == (angle > 1e-9)
+        for name in [*turns, "one axis for all"][: 3 + shown]:
+            assert_beside(artists[f"{name} name"], artists[name], artists["box"])
         assert reads(said["matrix"], R)
         assert reads(said["quaternion"], rb.quaternion_from_matrix(R))
         assert reads(said["angle"], np.degrees(angle))

@@ -32,7 +32,7 @@ def test_the_book_and_its_pin_turn_together(axes):
     flat = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * edges
     for i in (0, 3, 8, 1):
         book, pin, clock = update(i)
-        assert clock.get_text() == f"t = {times[i]:.1f}"
+        assert clock.get_text() == f"$t = {times[i]:.1f}$"
         corners = np.unique(book.corners[:6].reshape(-1, 3).round(12), axis=0)
         assert np.abs(np.sort(corners, 0) - np.sort(flat @ turned[i].T, 0)).max() < 1e-11
         foot, tip = places(pin).T
@@ -84,7 +84,7 @@ def test_the_construction_moves_along_lines_and_geodesics(axes, level):
     update = lesson11.moving_casteljau(axes, T, POINTS, ENDS, V)
     for i in (0, 4, 20, 7):
         clock, *artists = update(i)
-        assert clock.get_text() == f"t = {T[i]:.2f}"
+        assert clock.get_text() == f"$t = {T[i]:.2f}$"
         for name, (*legs, curve, point) in (("plane", artists[:4]), ("sphere", artists[4:])):
             for k, leg in enumerate(legs, 1):
                 marked = places(leg)[:, leg.get_markevery()]
