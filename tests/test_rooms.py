@@ -25,7 +25,7 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbclassroom.figures": {"rbcourse", "rbcourse.draw"},
     "rbclassroom.explorers": {"rbcourse", "rbcourse.draw"}
     | {"rbclassroom.course", "rbclassroom.figures"},
-    "rbclassroom.surveys": {"rbcourse", "rbcourse.draw"},
+    "rbclassroom.surveys": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
     "rbclassroom.course": {"rbclassroom"},  # this part may not import `rbcourse`
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbclassroom.course", "rbcourse.draw"},
