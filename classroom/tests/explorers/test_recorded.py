@@ -74,11 +74,20 @@ def test_recorded_states_equal_the_states_of_the_explorer(name):
         now = dict(zip([*moved, plays], places[k], strict=True))
         state = explorer.state(**now)
         assert texts[k] == json.loads(json.dumps(state.texts)), now
-        pairs = polygons(state.drawn, list(explorer.display.styles)), polygons(states[k], styles)
-        for (style, more, points), (kept, goes_on, found) in zip(*pairs, strict=True):
-            assert json.loads(json.dumps(style)) == kept
-            assert more == goes_on
-            assert np.abs(points - found).max() < 0.2  # in pixels
+        drawn, kept = (
+            polygons(state.drawn, list(explorer.display.styles)),
+            polygons(states[k], styles),
+        )
+        drawn, kept = [*drawn], [*kept]
+        assert len(drawn) == len(kept)
+        for style, more, points in drawn:  # faces of equal depth may have another order
+            alike = [
+                found
+                for look, goes_on, found in kept
+                if (look, goes_on) == (json.loads(json.dumps(style)), more)
+            ]
+            far = [np.abs(points - found).max() for found in alike if found.shape == points.shape]
+            assert min(far) < 0.2  # in pixels
 
 
 def test_records_have_the_same_bytes_each_time():
