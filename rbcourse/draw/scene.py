@@ -190,11 +190,14 @@ def context(colour: Any, width: float) -> GraphicsContextBase:
 
 
 def crossings(one: Piece, other: Piece) -> list[Piece]:
-    """Return the line in which two faces intersect, with the look of an edge."""
+    """Return the line in which two faces intersect, with the look of an edge.
+
+    Coplanar faces have no such line.
+    """
     normal: Any = other.normal
     height = (one.places - other.places[0]) @ normal
     i = np.flatnonzero(height * np.roll(height, -1) < 0)
-    if len(i) != 2:
+    if len(i) != 2 or np.abs(height).max() < 0.01:  # in pixels
         return []
     j = (i + 1) % len(height)
     share = (height[i] / (height[i] - height[j]))[:, None]

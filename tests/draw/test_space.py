@@ -182,6 +182,17 @@ def test_intersecting_bodies_have_an_outline_where_they_meet(ax):
     assert {piece.kind for piece in pieces} == {"face"}
 
 
+def test_bodies_in_the_same_place_have_no_outline_where_their_faces_coincide(ax):
+    """The corners differ by rounding errors only."""
+    corners = bodies.draw_box(ax, np.eye(4), 1.0).corners[:6]
+    ax.artists[0].remove()
+    one, other = (ax.add_artist(space.Faces(corners, 6 * ["0.9"])) for _ in "ab")
+    for turn in rb.exp_so3(np.random.default_rng(1).normal(size=(50, 3))):
+        one.corners, other.corners = corners @ turn.T, corners @ (turn @ turn.T @ turn).T
+        pieces = ax.scene.pieces(FigureCanvasAgg(ax.figure).get_renderer())
+        assert {piece.kind for piece in pieces} == {"face"}
+
+
 def test_edges_are_drawn_after_both_faces_that_they_bound(ax):
     bodies.draw_box(ax, np.eye(4), np.array([1.0, 0.8, 0.6]))
     for side in SIDES:
