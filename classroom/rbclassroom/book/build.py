@@ -18,7 +18,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from posixpath import normpath
 from typing import Any
 
 import nbformat
@@ -110,8 +109,8 @@ class Sources:
             figures += lessons.figures_of(path.name, notebook)
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
-            lead = decks[path.stem].shown[0].picture.partition("<script")[0]
-            sheet = lessons.prepared(notebook, path.name, self.root, known, where, lead)
+            drawing = decks[path.stem].shown[0].picture
+            sheet = lessons.prepared(notebook, path.name, self.root, known, where, drawing)
             lessons.add_buttons(notebook, path.name, self.repository)
             if self.live:
                 pages.mark_lesson(notebook, path.stem)
@@ -120,10 +119,6 @@ class Sources:
                 self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
             row = re.search(rf"^\| \[.*\]\(.*{path.name}\) \| (.*) \| (.*) \|$", readme, re.M)
             question, minutes = row.groups() if row else ("", "")
-            drawn = re.search(r' src="([^"]+)"', notebook.cells[0].source)
-            card = normpath(f"lessons/{drawn[1]}") if drawn else ""
-            if own := CONTENTS["cards"].get(path.stem[:2]):
-                card = f"figures/{own}.png"
             shown.append(
                 {
                     "stem": path.stem,
@@ -132,7 +127,7 @@ class Sources:
                     "sheet": sheet,
                     "question": question,
                     "minutes": minutes,
-                    "picture": card,
+                    "drawing": re.sub('role="img" aria-label=".*?"', 'aria-hidden="true"', drawing),
                 }
             )
         self.shown |= {"lessons": shown, "figures": figures, "works": sorted(works.items())}
@@ -156,9 +151,8 @@ class Sources:
             released = files.pop(f"{name}.ipynb")
             given, notebook = (nbformat.reads(released, as_version=4) for _ in range(2))
             title, _, rest = notebook.cells[0].source.partition("\n")
-            image = f'<img alt="" role="presentation" src="../{card["picture"]}">'
             told = (_TO_SOLVE if self.live else _TO_READ).format(name=name)
-            told = f'{told}\n<figure class="lead">{image}</figure>\n'
+            told = f'{told}\n<figure class="lead">{card["drawing"]}</figure>\n'
             notebook.cells[0].source = f"{title}\n{told}{rest}"
             if self.live:
                 pages.mark_problems(notebook)

@@ -242,7 +242,7 @@ def prepared(
 ) -> str:
     """Prepare the notebook of a lesson for the book, and return its run sheet.
 
-    The pictures become files, see `with_picture_files`. `lead` is the picture at the beginning.
+    The pictures become files, see `with_picture_files`. `lead` is the drawing at the beginning.
     """
     path, page, sheet_page = f"notebooks/{name}", f"lessons/{name}", f"teach/{Path(name).stem}.md"
     lessons = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
@@ -254,7 +254,7 @@ def prepared(
         found = lessons.get(int(match[2] or -1))
         return f"[{match[1]}]({found})" if found else match[0]
 
-    cells[0].source = with_lead(cells[0].source, with_picture_files(lead, known, folder))
+    cells[0].source = with_lead(cells[0].source, lead)
     for cell in cells:
         if cell.cell_type == "markdown":
             lines = cell.source.split("\n")

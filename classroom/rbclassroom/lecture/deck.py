@@ -147,7 +147,7 @@ def write(decks: dict[str, Deck], folder: Path, ready: Callable[[str], str] = st
     """
     shared = folder / "shared"
     shutil.copytree(STATIC / "vendor", shared, dirs_exist_ok=True)
-    for name in ("slides.css", "slides.js"):
+    for name in ("slides.css", "sketch.css", "slides.js"):
         shutil.copyfile(STATIC / name, shared / name)
     # reveal.js scales slides; with `window.pixels`, a canvas has as many pixels as on the screen
     texts = {"shared/display.js": ENGINE.replace("window.devicePixelRatio", "window.pixels")}
