@@ -61,7 +61,7 @@ def draw_box(ax: Any, pose: Array, edges: float | Array) -> Faces:
     `edges` gives the lengths of its three edges in m, or one length for a cube. `move_box` moves
     the box (BK Fig. 5).
     """
-    box: Faces = ax.add_artist(Faces(_box_faces(pose, edges), [*["0.98"] * 6, COLOURS["x"]]))
+    box: Faces = ax.add_artist(Faces(_box_faces(pose, edges), [*["#E6F0FB"] * 6, COLOURS["z"]]))
     return box
 
 
@@ -75,11 +75,11 @@ def draw_cube_motion(
 ) -> list[Any]:
     """Draw a cube at each pose, and stars in front of the cubes at their centres.
 
-    The edges of the cubes have the length `side` in m. Behind these cubes, blue outlines show cubes
-    at the poses `compared`. Return the artists of the cubes, and then the stars (BK Fig. 5).
+    The edges of the cubes have the length `side` in m. Behind these cubes, orange outlines show
+    cubes at the poses `compared`. Return the artists of the cubes, and then the stars (BK Fig. 5).
     """
     for pose in compared:
-        draw_box(ax, pose, side).set(colours=7 * ["none"], edgecolor=COLOURS["z"], zorder=-1)
+        draw_box(ax, pose, side).set(colours=7 * ["none"], edgecolor=COLOURS["x"], zorder=-1)
     cubes = [draw_box(ax, pose, side) for pose in poses]
     set_space(ax, poses[:, :3, 3], side, zoom=1.1)
     stars = draw_centre_path(ax, poses[:, :3, 3])
@@ -137,14 +137,14 @@ def set_turning(ax: Any, reach: float, zoom: float, lw: float = 2.0, named: bool
     ax.view_init(elev=20, azim=-55)
     for name, axis in zip("xyz", np.eye(3), strict=True):
         far = reach / float(np.linalg.norm(np.cross(axis, ax.sight().eye))) if named else reach
-        ax.plot(*np.outer(axis, [-reach, far]), color="0.85", lw=lw, zorder=0)
+        ax.plot(*np.outer(axis, [-reach, far]), color="0.75", lw=lw, zorder=0)
         if named:
-            ax.text(*(1.1 * far * axis), f"${name}$", color="0.5", ha="center", va="center")
+            ax.text(*(1.1 * far * axis), f"${name}$", color="0.4", ha="center", va="center")
 
 
 def draw_ground(ax: Any, low: Array, high: Array) -> None:
     """Draw a floor between two corners; its lines are at the numbers that `set_space` writes."""
-    pale: Any = {"color": "0.87", "lw": 0.8, "zorder": 0}
+    pale: Any = {"color": "0.8", "lw": 0.8, "zorder": 0}
     for x in [low[0], *_ticks(low[0], high[0]), high[0]]:
         ax.plot([x, x], [low[1], high[1]], low[2], **pale)
     for y in [low[1], *_ticks(low[1], high[1]), high[1]]:

@@ -19,7 +19,7 @@ ELEVATION, AZIMUTH = np.radians(20), np.radians(-60)
 def draw_sphere(ax: Any) -> None:
     """Draw the unit sphere with meridians and parallels; artists on the far side look pale."""
     turn = np.linspace(0, 2 * np.pi, 49)
-    thin: Any = {"color": "0.8", "lw": 0.5, "zorder": 0}
+    thin: Any = {"color": "0.7", "lw": 0.5, "zorder": 0}
     ax.add_artist(Ball())
     for longitude in np.radians(np.arange(0, 180, 30)):
         across = np.outer([np.cos(longitude), np.sin(longitude)], np.sin(turn))

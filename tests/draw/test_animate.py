@@ -152,8 +152,8 @@ def test_the_player_starts_with_the_still_frame(still, count):
     shown, background = (pixels(Image.open(png)) for png in pngs)
     twice = full(fig, update(still % count), 2 * fig.dpi)
     assert np.abs(shown - twice).mean() < 1  # the stars are drawn before the cube
-    # the orange square is hidden
-    assert (np.abs(background - [0xD5, 0x5E, 0x00]).max(axis=-1) >= 30).all()
+    # the blue square is hidden
+    assert (np.abs(background - [0x00, 0x72, 0xB2]).max(axis=-1) >= 30).all()
     assert (background < 128).any()  # the axes are drawn
     plt.close(fig)
 

@@ -76,11 +76,11 @@ def minimum_acceleration_explorer() -> Explorer:
 def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: one cube follows the optimum, another the projection.
 
-    A blue outline shows the optimum around the projection, too. The boundary conditions are those
-    of the paper, but three of them can be changed. The goal has a pale colour. The controls are the
-    ``turn``, as a fraction of the paper's; ``spin``, the last component of ω(1) in rad per unit
-    time; ``rise``, the last component of the final velocity in m per unit time; and the time ``t``,
-    which the play button moves (BK 6.3, BK (14), BK Fig. 5).
+    An orange outline shows the optimum around the projection, too. The boundary conditions are
+    those of the paper, but three of them can be changed. The goal has a pale colour. The controls
+    are the ``turn``, as a fraction of the paper's; ``spin``, the last component of ω(1) in rad per
+    unit time; ``rise``, the last component of the final velocity in m per unit time; and the time
+    ``t``, which the play button moves (BK 6.3, BK (14), BK Fig. 5).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -97,8 +97,8 @@ def cube_explorer() -> Explorer:
             artists[f"{way} goal"].set_alpha(0.25)
             fig.text(left + 0.25, 0.94, way, ha="center")
         artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
-        artists["difference"].set(edgecolor=COLOURS["z"], **_OUTLINE)
-        artists["difference name"] = new_name(ax, "optimum", color=COLOURS["z"])
+        artists["difference"].set(edgecolor=COLOURS["x"], **_OUTLINE)
+        artists["difference name"] = new_name(ax, "optimum", color=COLOURS["x"])
         fig.text(0.5, 0.02, "axes: 5 m long", ha="center")
     controls = {
         "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
