@@ -118,7 +118,8 @@ class _Reader:
             self.names |= {name.replace("fig", "figure "): len(self.shown) for name in figures}
             self.put_text(wish)
             last = self.shown[-1]
-            last.picture, last.aspect = picture_of(cell, self.root)
+            if not last.picture:  # a sketch can replace the figure
+                last.picture, last.aspect = picture_of(cell, self.root)
             if "_explorer()" in cell.source:
                 note = "M plays the picture. R shows its numbers, which stay on after the verdict."
                 last.notes.append(note)
