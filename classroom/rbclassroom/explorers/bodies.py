@@ -40,8 +40,9 @@ def body_explorer() -> Explorer:
             fig.text((k + 0.5) / 3, 0.94, law, color=style["color"], ha="center")
         ax = fig.add_axes((0.13, 0.092, 0.83, 0.39))
         ax.set(xlim=(0, 1), ylim=(0, 0.2), xlabel="time (s)", ylabel="torque (N m)")
-        ax.set(xticks=[0, 0.5, 1], yticks=[0, 0.1, 0.2])
-        ax.xaxis.set_label_coords(0.75, -0.035)  # between two numbers, which leaves more room
+        ax.set_yticks([0, 0.1, 0.2])
+        ax.set_xticks([0, 0.5, 1], ["0", "", "1"])
+        ax.xaxis.set_label_coords(0.5, -0.035)  # between two numbers, which leaves more room
         artists["now"] = ax.axvline(0, color=PALE, lw=1)
         artists |= {f"{law} torque": new_line(ax, **style) for law, style in LOOKS.items()}
     controls = {

@@ -183,7 +183,7 @@ def draw_growth(ax: Axes, data: Table, slopes: Mapping[int, float]) -> None:
     ax.minorticks_off()
     lowest = min(np.nanmin(median) for median in medians.values())
     _set_percents(ax, [x for x in [1e-12, 1e-10, 1e-8, 1e-6, *_LEVELS[::2]] if x > lowest / 30])
-    name_ends(ax, 0.07)
+    name_ends(ax, 0.085)
 
 
 def describe_growth(data: Table) -> str:
