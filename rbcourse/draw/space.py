@@ -55,7 +55,7 @@ class Faces(Artist):
     def __init__(self, corners: Array, colours: Any) -> None:
         super().__init__()
         self.corners = corners
-        self.set(colours=colours, edgecolor="0.3", linewidth=0.8)
+        self.set(colours=colours, edgecolor="#1a1d21", linewidth=1.2)
 
     def set_colours(self, colours: Any) -> None:
         """Set the colour of each face; a face with the colour "none" is not filled."""
@@ -79,7 +79,7 @@ class Faces(Artist):
             if not np.isfinite(corners).all() or not normal.any():
                 continue
             outward = np.sign(normal @ (corners.mean(axis=0) - centre)) * normal
-            light = round(32 * (0.78 + 0.22 * outward @ LIGHT)) / 32
+            light = round(32 * (0.84 + 0.16 * outward @ LIGHT)) / 32
             fill = (*np.clip(light * colour[:3], 0, 1), opacity * colour[3])
             places, zorder = scale * (corners - middle), self.get_zorder()
             face = Piece("face", places, edge, fill, zorder=zorder, normal=normal)

@@ -84,7 +84,8 @@ def _options(slide: Slide) -> str:
 def section(slide: Slide) -> str:
     """Return a slide as HTML for reveal.js."""
     layout, words, head = slide.kind, _words(slide), f"<h2>{_inline(slide.title)}</h2>"
-    picture = slide.picture
+    picture, text = slide.picture, "".join(slide.parts)
+    few = len(text) < (240 if "<svg" in picture else 120) and "$$" not in text
     if slide.kind in ("title", "end") and '"controls":[]' not in picture:
         picture = picture.partition("<script")[0]  # sliders would need much room
     if slide.kind == "title":
@@ -95,10 +96,9 @@ def section(slide: Slide) -> str:
     elif slide.poll:
         head, words = f"<h2>{_inline(slide.title)} · {slide.poll}</h2>", words + _options(slide)
     elif picture.startswith("<svg"):
-        layout = "plain sketched"
+        layout = "plain sketched" + " narrow" * few
     elif picture:
-        narrow = " narrow" * (sum(map(len, slide.parts)) < 120)
-        layout = "wide" if slide.aspect > WIDE else f"split{narrow}"
+        layout = "wide" if slide.aspect > WIDE else "split" + " narrow" * few
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
     if heading := re.match(r"\s*<h3>.*?</h3>", words):
