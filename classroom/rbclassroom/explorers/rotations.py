@@ -34,7 +34,7 @@ def rotation_explorer() -> Explorer:
     degrees; the play button moves ``beta`` (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
     """
     with new_figure() as fig:
-        ax = new_space(fig, (-0.15, -0.08, 1.28, 1.15), 1.18)
+        ax = new_space(fig, (-0.15, -0.08, 1.28, 1.15), 1.3)
         sight = ax.sight()
         artists: dict[str, Any] = {"box": draw_box(ax, np.eye(4), _BOX)}
         for axis, name in zip("zyx", _ENDS, strict=False):
