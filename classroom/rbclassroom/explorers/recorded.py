@@ -46,7 +46,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "planar": ({"omega1": range(-90, 91, 45), "omega2": range(-90, 91, 45)}, 2),
     "projection": ({"e12": [fifths / 5 for fifths in range(-5, 6)]}, 1),
     "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
-    "rotation": ({"alpha": range(-150, 151, 60), "gamma": range(-140, 161, 60)}, 5),
+    "rotation": ({"alpha": range(-160, 141, 60), "gamma": range(-160, 141, 60)}, 5),
     "screw": ({"tilt": range(0, 91, 15)}, 2),
     "spline": ({"pitch": [-60, -40, -20, 20, 60], "third": [2, 2.5, 3]}, 2),
     "theta": ({"angle": range(10, 171, 10)}, 1),

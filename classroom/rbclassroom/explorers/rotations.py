@@ -45,9 +45,9 @@ def rotation_explorer() -> Explorer:
         artists |= _axes_of(ax, "body", ls="-", lw=3.5)
         sizes = [artists[f"{name} name"].get_window_extent().size + 8 for name in _ENDS]
     controls = {
-        "alpha": widgets.slider("yaw α (°)", 30.0, -180.0, 180.0, 1.0),
+        "alpha": widgets.slider("yaw α (°)", 20.0, -180.0, 180.0, 1.0),
         "beta": widgets.stepped("pitch β (°)", -20.0, -90.0, 90.0, 1.0),
-        "gamma": widgets.slider("roll γ (°)", 40.0, -180.0, 180.0, 1.0),
+        "gamma": widgets.slider("roll γ (°)", 20.0, -180.0, 180.0, 1.0),
     }
 
     def show(alpha: float, beta: float, gamma: float) -> dict[str, str]:

@@ -78,14 +78,14 @@ def _options(slide: Slide) -> str:
         rows += f'<li class="option{state * (slide.kind == "verdict")}"><b>{letter}</b>'
         rows += f"<div>{_inline(text)}</div>"
         rows += f'<p class="idea{step}">{_inline(slide.ideas.get(letter, ""))}</p></li>'
-    return f'<ul class="options">{rows}</ul>'
+    brief = " brief" * all(len(text) < 12 for text in slide.options.values())
+    return f'<ul class="options{brief}">{rows}</ul>'
 
 
 def section(slide: Slide) -> str:
     """Return a slide as HTML for reveal.js."""
     layout, words, head = slide.kind, _words(slide), f"<h2>{_inline(slide.title)}</h2>"
     picture, text = slide.picture, "".join(slide.parts)
-    few = len(text) < (240 if "<svg" in picture else 120) and "$$" not in text
     if slide.kind in ("title", "end") and '"controls":[]' not in picture:
         picture = picture.partition("<script")[0]  # sliders would need much room
     if slide.kind == "title":
@@ -95,10 +95,10 @@ def section(slide: Slide) -> str:
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
     elif slide.poll:
         head, words = f"<h2>{_inline(slide.title)} · {slide.poll}</h2>", words + _options(slide)
-    elif picture.startswith("<svg"):
-        layout = "plain sketched" + " narrow" * few
+    elif picture.startswith("<svg") and slide.aspect < 1:
+        layout = "plain sketched" + " short" * (len(text) < 240 and "$$" not in text)
     elif picture:
-        layout = "wide" if slide.aspect > WIDE else "split" + " narrow" * few
+        layout = "wide" if slide.aspect > WIDE else "split"
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
     if heading := re.match(r"\s*<h3>.*?</h3>", words):

@@ -98,7 +98,8 @@ class _Reader:
     def borrowed(self, folder: str, name: str) -> tuple[str, float]:
         """Return the sketch ``sketches/name``, or the picture of the cell ``lesson/name``."""
         if folder == "sketches":
-            return (SKETCHES / f"{name}.svg").read_text(encoding="utf-8"), 0.9
+            sketch = (SKETCHES / f"{name}.svg").read_text(encoding="utf-8")
+            return sketch, int(sketch.split(maxsplit=5)[4]) / 720  # its height can vary
         path = self.root / "notebooks" / f"{folder}.ipynb"
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.id == name:

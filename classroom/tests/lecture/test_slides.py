@@ -111,7 +111,7 @@ def test_a_picture_is_shown_with_the_text_of_its_cell(tmp_path):
     margin = re.search(r'data-crop="([\d. ]+)"', high.picture)[1]
     assert [float(share) for share in margin.split()] == pytest.approx([0.09] * 4, abs=0.003)
     assert 'class="wide"' in pages.section(wide)
-    assert 'class="split narrow"' in pages.section(high)
+    assert 'class="split"' in pages.section(high)
     look = '<p class="look"><em>Look for:</em>\N{NO-BREAK SPACE}it.</p>'
     assert look in pages.section(wide)
     with pytest.raises(ValueError, match="there is no cell 01_tiny/nowhere"):
@@ -305,7 +305,7 @@ def test_each_sketch_has_a_description_and_a_slide():
     assert sketches
     for path in sketches:
         root = ET.parse(path).getroot()
-        assert re.fullmatch(r"0 -?\d+ 640 [1-7]\d\d", root.get("viewBox")), path.stem
+        assert re.fullmatch(r"0 -?\d+ (640|1030|1550) [1-8]\d\d", root.get("viewBox")), path.stem
         assert root.get("aria-label")
         assert any(f"![](sketches/{path.stem})" in text for text in texts), path.stem
 

@@ -30,7 +30,7 @@ const fit = (figure) => {
 // Text has the largest size that fits, of 50 (46 beside pictures) to 36 pixels. Gaps shrink before text.
 // A formula that is wider than its column shrinks, but not below 62 %.
 const settle = (section) => {
-  const body = section.querySelector(".body"), words = section.querySelector(".words"), plain = section.matches(".plain");
+  const body = section.querySelector(".body"), words = section.querySelector(".words"), plain = section.matches(".plain, .poll, .verdict");
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop), largest = plain ? 50 : 46;
   const gaps = words.children.length + all("li", words).length, space = (more) => words.style.setProperty("--more", `${more}px`);
   const over = () => words.offsetHeight > room || all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
@@ -47,10 +47,6 @@ const settle = (section) => {
     }
   } while (over() && ++trial < largest - 34);
   if (plain) space(Math.min(14, more + Math.max(0, (room - words.offsetHeight) / (2 * gaps)))); // gaps grow into the free room
-  const rows = all(".option", section), high = rows[0]?.offsetHeight;
-  for (const { style } of rows) { // boxes grow; those of a poll keep the room of its ideas
-    style.minHeight = `${Math.max(high, Math.min(165, high + (room - words.offsetHeight) / rows.length))}px`;
-  }
 };
 
 // Pictures of the current and of the next slide become interactive; on paper, pictures are stills.
@@ -65,6 +61,7 @@ const revive = async (section) => {
     const panel = Object.assign(document.createElement("div"), { className: "panel" });
     panel.append(...all(":scope > div > div:is(:has(> input), :last-child)", figure));
     section.querySelector(".words").append(panel);
+    settle(section);
     new ResizeObserver(() => fit(figure)).observe(panel); // the numbers come later
   }
   const asked = section.parentElement.querySelector(".title, .poll") && !section.dataset.told;
