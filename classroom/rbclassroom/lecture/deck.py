@@ -23,14 +23,13 @@ _LINK = re.compile(r"(?<!!)\[([^\]\n]+)\]\((?!https?:)[^)\s]+\)")  # links to fi
 _TOGETHER = {  # patterns of text that must stay on one line
     r"(\d) (%|°|m|kg|s|rad|: \d)(?![\w\\])": "\\1\N{NO-BREAK SPACE}\\2",
     r"\b(kg|N) (?=m)": "\\1\N{NO-BREAK SPACE}",
-    r"\b((?:half|quarter|near)-\w+)": r'<span class="whole">\1</span>',
+    r"\b((?:half|quarter|near|p)-\w+)": r'<span class="whole">\1</span>',
     r"\b([Ff]igure|[Ll]esson|[Ss]ection) (?=\d)": "\\1\N{NO-BREAK SPACE}",
     r" (–|\d{1,2}[.,]|: (?=\d))": "\N{NO-BREAK SPACE}\\1",
     r"(\d)–(\d)": "\\1\N{WORD JOINER}–\N{WORD JOINER}\\2",
-    r" ([^\s<]{1,5}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
+    r" ([^\s<]{1,8}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
 }
 _WHOLE = re.compile(r'(<span class="math inline">(?:(?!</span>).)*</span>[.,;:?!)]+)')
-
 _SYMBOL = re.compile(
     r' (?=(?:<span class="whole">)?<span class="math inline">\\\((?:\w|\\\w+)\\\))'
 )
@@ -76,10 +75,9 @@ def _options(slide: Slide) -> str:
         state = " right" if letter == slide.right else " wrong"
         step = " fragment" if letter != slide.right and slide.kind == "verdict" else ""
         rows += f'<li class="option{state * (slide.kind == "verdict")}"><b>{letter}</b>'
-        rows += f"<div>{_inline(text)}</div>"
+        rows += f"<div{' class=large' * (len(text) < 12)}>{_inline(text)}</div>"
         rows += f'<p class="idea{step}">{_inline(slide.ideas.get(letter, ""))}</p></li>'
-    brief = " brief" * all(len(text) < 12 for text in slide.options.values())
-    return f'<ul class="options{brief}">{rows}</ul>'
+    return f'<ul class="options{" brief" * (rows.count("=large>") > 2)}">{rows}</ul>'
 
 
 def section(slide: Slide) -> str:

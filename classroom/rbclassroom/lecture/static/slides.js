@@ -12,7 +12,7 @@ const fit = (figure) => {
   const seen = figure.querySelector(":scope > :is(canvas, img)"), body = figure.closest(".body");
   if (!seen || !figure.clientWidth) return;
   const numbers = body.querySelector(".panel > div:not(:has(> input))"); // they stand below the picture if they need the room
-  if (numbers && body.querySelector(".words").offsetHeight > body.clientHeight) figure.append(numbers);
+  if (numbers && body.querySelector(".words").offsetHeight + 34 > body.clientHeight) figure.append(numbers);
   const below = all(":scope > div", figure).reduce((sum, { offsetHeight }) => sum + offsetHeight, 0);
   figure.dataset.crop ??= seen.dataset.crop;
   const [left, top, right, bottom] = figure.dataset.crop.split(" ").map(Number);
