@@ -3,4 +3,4 @@
 This package uses only the names that `rbcourse` exports.
 """
 
-__version__ = "1.3.1"
+__version__ = "1.4.0"

@@ -36,14 +36,14 @@ def theta_explorer() -> Explorer:
         # the height 0 is that of the right picture
         ax.set(xlim=(-1.03, 1.3), ylim=(-0.218, 1.25), aspect="equal", anchor="SW")
         ax.set_axis_off()
-        side = fig.add_axes((0.665, 0.18, 0.31, 0.62))
+        side = fig.add_axes((0.665, 0.18, 0.31, 0.72))
         side.set(xlim=(0, 1), ylim=(0, 1), xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])
         side.set_xlabel("time $t$")
         black: Any = {"color": COLOURS["optimum"]}
         pink: Any = {"color": COLOURS["projection"]}
         side.tick_params("y", pad=8)  # otherwise the dots cover the numbers
         side.plot([0, 1], [0, 1], **black, lw=1.5)
-        side.text(0.56, 0.38, "geodesic", **black)
+        side.text(0.96, 0.4, "geodesic", ha="right", **black)
         side.text(0.45, 0.85, r"$\theta(t)$", ha="right", **pink)
         ax.text(0, 1.12, "geodesic", ha="center", **black)
         ax.text(0, -0.16, "projection", ha="center", **pink)
