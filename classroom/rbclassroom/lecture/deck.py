@@ -27,7 +27,7 @@ _TOGETHER = {  # patterns of text that must stay on one line
     r"\b([Ff]igure|[Ll]esson|[Ss]ection) (?=\d)": "\\1\N{NO-BREAK SPACE}",
     r" (–|\d{1,2}[.,]|: (?=\d))": "\N{NO-BREAK SPACE}\\1",
     r"(\d)–(\d)": "\\1\N{WORD JOINER}–\N{WORD JOINER}\\2",
-    r"(?<!>) ([^\s<]{1,8}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
+    r"(?<!span>) ([^\s<]{1,8}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
 }
 _WHOLE = re.compile(r'(<span class="math inline">(?:(?!</span>).)*</span>[.,;:?!)]+)')
 _SYMBOL = re.compile(

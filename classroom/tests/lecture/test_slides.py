@@ -224,6 +224,8 @@ def test_no_line_break_separates_a_number_from_its_unit():
     whole = "In 5_% of 12_m, pages 3~–~9, it is so_– or 1_: 2 of <em>it</em>_is."
     marks = {"_": "\N{NO-BREAK SPACE}", "~": "\N{WORD JOINER}"}
     assert pages.marked(text).strip() == f"<p>{whole.translate(str.maketrans(marks))}</p>"
+    # a line can break after a formula; a no-break space would then begin the next line
+    assert "</span> counts.</p>" in pages.marked("Only $a + b$ counts.")
 
 
 def test_a_question_about_a_poll_is_asked_after_the_vote(tmp_path):
