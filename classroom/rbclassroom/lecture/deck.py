@@ -30,9 +30,7 @@ _TOGETHER = {  # patterns of text that must stay on one line
     r"(?<!span>) ([^\s<]{1,8}</(?:p|li|h3)>)": "\N{NO-BREAK SPACE}\\1",
 }
 _WHOLE = re.compile(r'(<span class="math inline">(?:(?!</span>).)*</span>[.,;:?!)]+)')
-_SYMBOL = re.compile(
-    r' (?=(?:<span class="whole">)?<span class="math inline">\\\((?:\w|\\\w+)\\\))'
-)
+_SYMBOL = re.compile(r' (?=(?:<span class="whole">)?<span class="math inline">\\\(\\?\w+\\\))')
 
 
 def _math(text: str, options: dict[str, Any]) -> str:
@@ -94,7 +92,7 @@ def section(slide: Slide) -> str:
     elif slide.poll:
         head, words = f"<h2>{_inline(slide.title)} · {slide.poll}</h2>", words + _options(slide)
     elif picture.startswith("<svg") and slide.aspect < 1:
-        layout = "plain sketched" + " short" * (len(text) < 240 and "$$" not in text)
+        layout = "plain sketched" + " short" * (len(text) < 290 and "$$" not in text)
     elif picture:
         layout = "wide" if slide.aspect > WIDE else "split"
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
@@ -148,7 +146,8 @@ def write(decks: dict[str, Deck], folder: Path, ready: Callable[[str], str] = st
     for name in ("slides.css", "sketch.css", "slides.js"):
         shutil.copyfile(STATIC / name, shared / name)
     # reveal.js scales slides; with `window.pixels`, a canvas has as many pixels as on the screen
-    texts = {"shared/display.js": ENGINE.replace("window.devicePixelRatio", "window.pixels")}
+    engine = ENGINE.replace("window.devicePixelRatio", "window.pixels")
+    texts = {"shared/display.js": engine.replace("lineWidth: line", "lineWidth: 1.4 * line")}
     for name, deck in decks.items():
         texts[f"{name}.html"] = ready(deck_page(deck))
         if deck.sheet:

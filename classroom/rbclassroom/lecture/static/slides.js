@@ -27,11 +27,11 @@ const fit = (figure) => {
   seen.onpointerdown = () => { seen.style.clipPath = "none"; }; // a scene that turns needs its margins
 };
 
-// Text has the largest size that fits, of 50 (46 beside pictures) to 36 pixels. Gaps shrink before text.
+// Text has the largest size that fits, of 50 to 36 pixels. Gaps shrink before text.
 // A formula that is wider than its column shrinks, but not below 62 %.
 const settle = (section) => {
-  const body = section.querySelector(".body"), words = section.querySelector(".words"), plain = section.matches(".plain, .poll, .verdict");
-  const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop), largest = plain ? 50 : 46;
+  const body = section.querySelector(".body"), words = section.querySelector(".words");
+  const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop), largest = 50;
   const gaps = words.children.length + all("li", words).length, space = (more) => words.style.setProperty("--more", `${more}px`);
   const over = () => words.offsetHeight > room || all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
   let trial = 0, more = 0;
@@ -46,7 +46,7 @@ const settle = (section) => {
       if (width > column + 1) box.style.fontSize = `${Math.max(62, Math.floor((98 * column) / width))}%`;
     }
   } while (over() && ++trial < largest - 34);
-  if (plain) space(Math.min(14, more + Math.max(0, (room - words.offsetHeight) / (2 * gaps)))); // gaps grow into the free room
+  space(Math.min(14, more + Math.max(0, (room - words.offsetHeight) / (2 * gaps)))); // gaps grow into the free room
 };
 
 // Pictures of the current and of the next slide become interactive; on paper, pictures are stills.
