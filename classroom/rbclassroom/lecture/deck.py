@@ -82,6 +82,7 @@ def section(slide: Slide) -> str:
     """Return a slide as HTML for reveal.js."""
     layout, words, head = slide.kind, _words(slide), f"<h2>{_inline(slide.title)}</h2>"
     picture, text = slide.picture, "".join(slide.parts)
+    short = len(text) < 290 and "$$" not in text and "|-" not in text
     if slide.kind in ("title", "end") and '"controls":[]' not in picture:
         picture = picture.partition("<script")[0]  # sliders would need much room
     if slide.kind == "title":
@@ -92,7 +93,7 @@ def section(slide: Slide) -> str:
     elif slide.poll:
         head, words = f"<h2>{_inline(slide.title)} · {slide.poll}</h2>", words + _options(slide)
     elif picture.startswith("<svg") and slide.aspect < 1:
-        layout = "plain sketched" + " short" * (len(text) < 290 and "$$" not in text)
+        layout = "plain sketched" + " short" * short
     elif picture:
         layout = "wide" if slide.aspect > WIDE else "split"
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
