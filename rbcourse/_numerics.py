@@ -1,14 +1,17 @@
 """Numerical tools: ratios near zero, scaling by powers of two, blocks that fit into the cache."""
 
 import math
-from collections.abc import Iterator
-from typing import Any, TypeAlias
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 EPS = float(np.finfo(np.float64).eps)
+Item = TypeVar("Item")
 
 
 def sinc(x: Array) -> Array:
@@ -45,6 +48,16 @@ def blocks(count: int, size: int) -> Iterator[slice]:
     """Yield slices that divide `count` items into parts of at most `size`."""
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
+
+
+def reported(work: str, items: Sequence[Item]) -> Iterator[Item]:
+    """Yield the items; after 10 s, and then every 5 s, write the progress to stderr."""
+    due = time.monotonic() + 10
+    for number, item in enumerate(items):
+        if time.monotonic() > due:
+            print(f"{work}: {number / len(items):.0%}", file=sys.stderr, flush=True)
+            due = time.monotonic() + 5
+        yield item
 
 
 def at_cache_line(*shape: int) -> Array:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from inspect import Parameter, signature
-from typing import Self
+from operator import index
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +34,7 @@ from rbcourse.velocities import (
 )
 
 Leg = Callable[..., Curve]
+RestAt = Sequence[int] | NDArray[np.integer] | Literal["repeated"]
 
 _ARRIVED = 1e-6
 
@@ -43,6 +45,7 @@ def chain(
     velocities: ArrayLike | None = None,
     *,
     leg: Leg | None = None,
+    rest_at: RestAt = (),
 ) -> Chain:
     """Return a curve through poses at given times, by default at rest at both ends.
 
@@ -54,7 +57,7 @@ def chain(
         As for `bessel_velocities`.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists or angular velocities at the poses. The default is the `spline_velocities`, with
-        velocity 0 at both ends and at successive poses that are equal up to rounding.
+        velocity 0 at both ends and at the poses `rest_at`.
     leg : callable, optional
         A function, from this package or your own, that makes the legs. It returns a stack of
         two-point curves, and is called once for all legs. Its arguments are the keyword
@@ -62,6 +65,11 @@ def chain(
         in the fixed frame). A function for rotations can also join poses: the origin then moves on
         the polynomial with the same number of boundary conditions. The default is
         `projected_cubic_so3`, or for poses `projected_cubic_se3`.
+    rest_at : sequence of int or "repeated", optional
+        The indices of inner poses at which the curve rests. "repeated" means all poses that equal
+        the previous or the next pose, as during a pause of a recording; the curve then stands still
+        between them. Otherwise, a repeated pose is an ordinary pose: the curve leaves it and
+        returns.
 
     Returns
     -------
@@ -72,9 +80,10 @@ def chain(
     Raises
     ------
     ValueError
-        As for `bessel_velocities`. Also if `velocities` are given but `leg` takes none, or if `leg`
-        needs other arguments, raises ValueError, or misses the next pose by more than 1e-6. The
-        message names the first such place. Warnings and other errors are those of `leg`.
+        As for `bessel_velocities`. Also if both `velocities` and `rest_at` are given, if one of
+        them is given but `leg` takes no velocities, or if `leg` needs other arguments, raises
+        ValueError, or misses the next pose by more than 1e-6. The message names the first such
+        place. Warnings and other errors are those of `leg`.
 
     Notes
     -----
@@ -109,7 +118,12 @@ def chain(
     wanted = _arguments(leg)
     if velocities is not None and "w0" not in wanted:
         raise ValueError("velocities: the legs take none")
-    own, bends = resting_spline(times, poses)
+    rests = _rests(rest_at, poses)
+    if rests[1:-1].any() and velocities is not None:
+        raise ValueError("rest_at: the velocities are given; set them to 0 at rests")
+    if rests[1:-1].any() and "w0" not in wanted:
+        raise ValueError("rest_at: the legs take no velocities")
+    own, bends = resting_spline(times, poses, rests)
     if velocities is None and "w0" in wanted:
         velocities = own
     twists = own if velocities is None else velocities
@@ -317,25 +331,17 @@ class Chain(Curve):
             in_order = np.argsort(times)
             values[in_order] = self.evaluate(t[in_order], order)
             return values
-        cuts = np.searchsorted(times, self.times[1:-1])
-        counts = np.diff(np.concatenate([[0], cuts, [len(times)]]))
-        own = np.repeat(np.arange(len(counts)), counts)
+        own = np.searchsorted(self.times[1:-1], times, side="right")
         shares = np.minimum((times - self.times[own]) / np.diff(self.times)[own], 1)
-        leg, index = _even_parts(counts)
-        for part in blocks(len(leg), max(1, BLOCK // index.shape[1])):
-            rows = index[part]
-            try:
-                some = self.legs.take(leg[part]).values(shares[rows].T, order)
-            except SingularTime as error:
-                i = leg[part][error.curve]
-                after = error.time * self.legs.duration[i]
-                raise ValueError(
-                    f"leg {i}, from {self.times[i]} to {self.times[i + 1]}, {after} after its "
-                    f"start: {error.reason}"
-                ) from error
-            values[rows, 0] = some.swapaxes(0, 1)
-        if order:
-            values /= self.legs.duration[own].reshape(-1, *(1 for _ in values.shape[1:])) ** order
+        try:
+            values[:, 0] = evaluate_legs(self.legs, own, shares, order)
+        except SingularTime as error:
+            i = error.curve
+            after = error.time * self.legs.duration[i]
+            raise ValueError(
+                f"leg {i}, from {self.times[i]} to {self.times[i + 1]}, {after} after its "
+                f"start: {error.reason}"
+            ) from error
         return values
 
     def check_smooth(self, name: str, order: int) -> None:
@@ -351,6 +357,28 @@ class Chain(Curve):
                     raise RuntimeError(f"{name}: {what} jumps at a joint, by {jump:.3g}")
 
 
+def evaluate_legs(legs: Curve, own: NDArray[np.intp], shares: Array, order: int) -> Array:
+    """Return the values of the legs `own`, shape (n,), at fractions of their durations.
+
+    `own` increases. A SingularTime has the number of the leg, and the fraction as its time.
+    """
+    first = own[0] if len(own) else 0
+    leg, index = _even_parts(np.bincount(own - first))
+    values = np.empty((len(own), *legs._core(order)))
+    for part in blocks(len(leg), max(1, BLOCK // index.shape[1])):
+        rows = index[part]
+        try:
+            some = legs.take(first + leg[part]).values(shares[rows].T, order)
+        except SingularTime as error:
+            raise SingularTime(
+                error.time, int(first + leg[part][error.curve]), error.reason
+            ) from error
+        values[rows] = some.swapaxes(0, 1)
+    if order:
+        values /= legs.duration[own].reshape(-1, *(1 for _ in values.shape[1:])) ** order
+    return values
+
+
 def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Divide successive groups of `counts` rows into parts of equal length.
 
@@ -358,7 +386,7 @@ def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.
     parts are filled up by repeating their last row.
     """
     mean = math.ceil(counts.sum() / max(1, np.count_nonzero(counts)))
-    length, ends = max(1, min(int(counts.max()), 2 * mean)), np.cumsum(counts)
+    length, ends = max(1, min(int(counts.max(initial=0)), 2 * mean)), np.cumsum(counts)
     parts = (counts + length - 1) // length
     run = np.repeat(np.arange(len(counts)), parts)
     number = np.arange(len(run)) - np.repeat(np.cumsum(parts) - parts, parts)
@@ -424,6 +452,24 @@ def _check_arrival(legs: Curve, poses: Array) -> None:
         if np.isnan(missed[:, i]).any():
             raise ValueError(f"leg: it found no curve from poses[{i}] to poses[{i + 1}] (NaN)")
         raise ValueError(f"leg: it does not lead from poses[{i}] to poses[{i + 1}]")
+
+
+def _rests(rest_at: RestAt, poses: Array) -> NDArray[np.bool_]:
+    """Return the poses at which a chain rests, shape (N,): both ends, and those of `rest_at`."""
+    rests = np.zeros(len(poses), bool)
+    rests[[0, -1]] = True
+    if isinstance(rest_at, str):
+        if rest_at != "repeated":
+            raise ValueError(f"rest_at: indices or 'repeated' is wanted, got {rest_at!r}")
+        same = (poses[1:] == poses[:-1]).all(axis=(1, 2))
+        return rests | np.append(same, False) | np.append(False, same)
+    try:
+        rests[[index(i) for i in rest_at]] = True
+    except (TypeError, IndexError) as error:
+        raise ValueError(
+            f"rest_at: indices of the {len(poses)} poses are wanted, got {rest_at!r}"
+        ) from error
+    return rests
 
 
 def _rotated(poses: Array, v: Array) -> Array:

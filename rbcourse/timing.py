@@ -14,10 +14,12 @@ the convex hull of its Bernstein coefficients, so that the limit holds in the wh
 for them. They have the form p x_i + q y + k. So each limit is an ellipse, or a strip, in the plane
 of x_i and y. Since a, b and k may jump between cells, their values inside the cell are used.
 
-The algorithm makes two passes. The backward pass finds the largest x_i from which the end can be
-reached. The forward pass finds the largest x_i+1 that x_i and the first pass allow. Since the
-limits of a cell are convex, the passes find a timing that satisfies the limits on the cells, if one
-exists. The motion takes the time Σ 2h/(s'_i + s'_i+1), which decreases if any x increases.
+The body stops where the path rests or its velocity jumps. Legs in which the path stands still take
+no time. On the pieces between stops, the algorithm makes two passes. The backward pass finds the
+largest x_i from which the end can be reached. The forward pass finds the largest x_i+1 that x_i and
+the first pass allow. Since the limits of a cell are convex, the passes find a timing that satisfies
+the limits on the cells, if one exists. The motion takes the time Σ 2h/(s'_i + s'_i+1), which
+decreases if any x increases.
 
 Near the top of an ellipse, x_i grows only if y decreases. TOPP-RA chooses the largest x_i, which is
 not the best choice there, since a small gain of x_i causes a large loss of y. The time depends
@@ -33,27 +35,33 @@ other method that times poses under limits on the norms of vectors.
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import inf, sqrt
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_finite, as_inertia, as_positive, as_single, as_time
-from rbcourse._numerics import Array, cross, matvec
+from rbcourse._numerics import Array, blocks, cross, matvec, reported
 from rbcourse.curves import Curve
-from rbcourse.paths import Chain
+from rbcourse.paths import Chain, evaluate_legs
 
-FINER = 1, 2, 4, 8
+REFINEMENTS = 3  # how often the cells of a leg are halved if it exceeds a limit
 TOLERANCE = 1e-4  # the share by which a limit may be exceeded
-_PLACES = np.array([0, 0.5, 1])[:, None, None]
+_BLOCK = 1024  # cells, or times, that are evaluated together
+_MEMORY = 200  # bytes for each cell: places, two passes, and the result
+_DENSE = 0.2  # a leg has fewer cells if its velocity changes by less than this share
+_PLACES = np.array([0, 0.5, 1])
 """The places in a cell at which the path is evaluated."""
+_CHECKED = np.array([0.04, 0.25, 0.75, 0.96])
+"""The places in a cell at which the limits are checked."""
 _CONTROL = np.array([[1, 0, 0], [-0.5, 2, -0.5], [0, 0, 1]])
-"""Maps the values of a quadratic polynomial at these places to its Bernstein coefficients."""
+"""Maps the values of a quadratic polynomial at the places to its Bernstein coefficients."""
 _SPEEDS = "angular_speed", "speed"
 _BENDS = "angular_acceleration", "acceleration", "torque", "force"
 Row = tuple[str, Array, Array, Array]
@@ -109,8 +117,11 @@ def fastest(
     Raises
     ------
     ValueError
-        If the path stands still, if no limit bounds the speed, if the force cannot hold the body at
-        rest, or if the `rates` are out of reach. The message names the first place on the path.
+        If the whole path stands still, if no limit bounds the speed, if the force cannot hold the
+        body at rest, or if the `rates` are out of reach. The message names the first place on the
+        path.
+    MemoryError
+        If the cells need more memory than the computer has.
 
     Warns
     -----
@@ -119,11 +130,18 @@ def fastest(
 
     Notes
     -----
-    The grid has 1,000 cells or, for a chain, 250 for each leg (25 if there are many legs). It is
-    refined by factors of at most eight, until no limit is exceeded by more than 1e-4. T is then
-    about 1e-3 above the shortest time. The motion stops where the velocity of the path jumps. Its
-    acceleration jumps where that of the path jumps, at both ends, and between cells; the jerk is
-    not limited. A thousand cells take about 50 ms.
+    The grid has 1,000 cells or, for a chain, 250 for each leg. If there are many legs, each has 25
+    cells, or as few as 4 if its velocity hardly changes. A leg in which a limit is exceeded by more
+    than 1e-4 gets twice as many cells, up to three times. T is then about 1e-3 above the shortest
+    time (4e-3 for some paths with hundreds of legs). The calculation takes about 50 ms for 1,000
+    cells, and a time and a memory in proportion for more. If it takes more than 10 s, lines on
+    stderr show its progress.
+
+    The result depends only on the path: neither a shift of its times nor another unit of time
+    changes T. The motion stops where the path rests or its velocity jumps, and legs in which the
+    path stands still take no time. The acceleration jumps where that of the path jumps, at stops,
+    and between cells; the jerk is not limited. If noise bends the path between the poses, the
+    motion follows the noise, and is slow.
 
     Examples
     --------
@@ -133,9 +151,9 @@ def fastest(
     >>> round(c.domain[1], 4), c(1.75, 1).round(9)
     (3.5, array([0., 0., 1.]))
     """
-    path = curve.curve if isinstance(curve, Timed) else curve
+    given = curve.curve if isinstance(curve, Timed) else curve
     rows_of = _limits(
-        path,
+        given,
         angular_speed=angular_speed,
         speed=speed,
         angular_acceleration=angular_acceleration,
@@ -147,27 +165,26 @@ def fastest(
         centre=centre,
         gravity=gravity,
     )
+    if all(x is None for x in (angular_acceleration, acceleration, torque, force)):
+        raise ValueError(f"limits: one of {', '.join(_BENDS)} is needed")
     ends = as_single("rates", rates, 2)
     if ends.min() < 0:
         raise ValueError(f"rates: two numbers from 0 up are wanted, got {rates}")
-    for finer in FINER:
-        s, V, A, R, caps, near = _sampled(path, finer)
-        rows, moving = list(rows_of(V, A, R)), np.array([V[0, 0].any(), V[-1, -1].any()])
-        if all(name in _SPEEDS for name, *_ in rows):
-            raise ValueError(f"limits: one of {', '.join(_BENDS)} is needed")
-        held = np.max([np.linalg.norm(k, axis=-1) for *_, k in rows], axis=(0, 1))
-        if (held >= 1).any():
-            where = f"to hold the body near s = {s[np.argmax(held >= 1)]:.6g}"
-            raise ValueError(f"force: {held.max():.6g} times the limit is needed {where}")
-        x = _two_passes(s, _ellipses(np.diff(s), rows, near), caps, ends**2 * moving, moving)
-        timed = Timed(duration=np.array(1.0), curve=path, s=s, rate=np.sqrt(x))
-        timed = replace(timed, duration=np.array(timed.times[-1]))
-        most, when = max(_shares(timed, rows_of, 1001).values())
-        if most <= 1 + TOLERANCE:
-            return timed
-    what = f"a limit is exceeded by {most - 1:.1e} near s = {timed.progress(when)[0]:.6g}"
-    warnings.warn(what, RuntimeWarning, stacklevel=2)
-    return timed
+    path = _surveyed(given, ends**2)
+    counts = path.cell_counts()
+    for left in range(REFINEMENTS, -1, -1):
+        grid = _Grid(path, counts, rows_of)
+        x, y = _two_passes(grid)
+        shares = grid.largest_shares(x, y)
+        over = shares > 1 + TOLERANCE
+        if left == 0 or not over.any():
+            break
+        counts[np.unique(grid.leg[over])] *= 2
+    if over.any():
+        worst = np.argmax(shares)
+        what = f"exceeded by {shares[worst] - 1:.1e} near s = {grid.place(worst):.6g}"
+        warnings.warn(f"a limit is {what}", RuntimeWarning, stacklevel=2)
+    return grid.timed(given, x, y)
 
 
 def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
@@ -199,16 +216,29 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
 
 
 def _shares(curve: Curve, rows_of: Rows, count: int) -> dict[str, tuple[float, float]]:
-    t = np.linspace(*curve.domain, count)
-    if isinstance(curve, Chain | Timed):
-        starts, ends = curve.times[:-1], np.nextafter(curve.times[1:], -inf)
-        t = np.unique([*t, *starts, *(starts + ends) / 2, *ends])
-    shares: dict[str, Array] = {}
-    for name, _, b, k in rows_of(curve(t, 1), curve(t, 2), curve(t)[:, :3, :3]):
-        share = np.linalg.norm(b + k, axis=-1) ** (0.5 if name in _SPEEDS else 1)
-        shares[name] = np.maximum(shares.get(name, 0.0), share)
-    first = {name: np.argmax(x >= x.max() * (1 - 1e-6)) for name, x in shares.items()}
-    return {name: (float(x.max()), float(t[first[name]])) for name, x in shares.items()}
+    start, c = curve.domain[0], _from_zero(curve)
+    t = np.linspace(*c.domain, count)
+    if isinstance(c, Chain | Timed):
+        starts, ends = c.times[:-1], np.nextafter(c.times[1:], -inf)
+        t = np.unique([*t, *starts, *(starts + ends) / 2, *np.maximum(starts, ends)])
+    most: dict[str, tuple[float, float]] = {}
+    for part in blocks(len(t), _BLOCK):
+        V, A, R = c(t[part], 1), c(t[part], 2), c(t[part])[:, :3, :3]
+        for name, _, b, k in rows_of(V, A, R):
+            share = np.linalg.norm(b + k, axis=-1) ** (0.5 if name in _SPEEDS else 1)
+            if share.max() > most.get(name, (0.0, 0.0))[0] * (1 + 1e-6):
+                first = np.argmax(share >= share.max() * (1 - 1e-6))
+                most[name] = float(share.max()), float(t[part][first]) + start
+            else:
+                most.setdefault(name, (0.0, start))
+    return most
+
+
+def _from_zero(curve: Curve) -> Curve:
+    """Return the curve with times that begin at 0; large times would lose digits in differences."""
+    if isinstance(curve, Chain):
+        return replace(curve, times=curve.times - curve.times[0])
+    return curve
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -220,20 +250,21 @@ class Timed(Curve):
     Attributes
     ----------
     curve : Curve
-        The path c(s).
-    s, rate, times : ndarray, shape (N + 1,)
+        The path c. For a chain, s = 0 is its first time.
+    s, rate, times : ndarray, shape (N,)
         The grid points, the values of s' there, and the times at which the curve passes them. The
-        curve passes the pose c(s0) of the path at ``times[np.searchsorted(s, s0)]``.
+        curve passes the pose at s0 of the path at ``times[np.searchsorted(s, s0)]``. At a stop, s'
+        jumps, and two grid points have the same time.
     """
 
     curve: Curve
     s: Array
     rate: Array
+    times: Array
 
     @cached_property
-    def times(self) -> Array:
-        """The times at which the curve passes the grid points."""
-        return np.append(0, np.cumsum(2 * np.diff(self.s) / (self.rate[1:] + self.rate[:-1])))
+    def _path(self) -> Curve:
+        return _from_zero(self.curve)
 
     @property
     def size(self) -> int:
@@ -242,21 +273,22 @@ class Timed(Curve):
 
     def lasting(self, duration: Array) -> Self:
         """Return the same curve with another duration."""
-        return replace(self, duration=duration, rate=self.rate * (self.duration / duration))
+        k = duration / self.duration
+        return replace(self, duration=duration, rate=self.rate / k, times=self.times * k)
 
     def progress(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Return s, s' and s'' at the times t."""
         t = as_time(t, 0, self.domain)
         i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.s) - 2)
         past, v = t - self.times[i], self.rate[i]
-        u = (np.diff(self.rate**2) / np.diff(self.s) / 2)[i]
+        u = (self.rate[i + 1] ** 2 - v**2) / (self.s[i + 1] - self.s[i]) / 2
         last = np.where(t < self.times[-1], np.nextafter(self.s[i + 1], -inf), self.s[-1])
         return np.clip(self.s[i] + past * (v + past * u / 2), self.s[i], last), v + past * u, u
 
     def evaluate(self, t: Array, order: int) -> Array:
         """Return the values at the times t, shape (T, 1), by the chain rule."""
         s, v, u = self.progress(t)
-        c = [self.curve.evaluate(s, k) for k in range((order + 1) // 2, order + 1)]
+        c = [self._path.evaluate(s, k) for k in range((order + 1) // 2, order + 1)]
         v, u = v[..., None], u[..., None]
         if order < 2:
             return c[0] * v if order else c[0]
@@ -318,103 +350,243 @@ def _limits(
     return rows
 
 
-def _sampled(path: Curve, finer: int) -> tuple[Array, ...]:
-    """Return the grid points s, shape (N + 1,), and V, A, R at three places of each of the N cells.
+class _Path(NamedTuple):
+    """The legs of a path from the time 0 on, in a flat stack, and their ends.
 
-    Each leg has the same number of cells, which are smaller near ends with c' = c'' = 0. The array
-    `caps` has the largest allowed x: 0 at these ends and at corners, and infinity elsewhere. The
-    cells `near` rest are the first or last 4 % of a leg.
+    The first axis of `x`, `slow` and `rest` has the length 2, for the start and the end of a leg.
+    At a stop, `x` is the value of x: 0, the value of `rates`, or infinity if it is free, since the
+    body rests. Elsewhere, it is NaN.
     """
-    knots = path.times if isinstance(path, Chain) else np.array(path.domain)
-    h, L, halves = np.diff(knots), len(knots) - 1, path.size - 2
-    n = finer * max(1000 // L, min(250, 4000 // L), 25)
 
-    def at(share: Array) -> Array:
-        return np.minimum(knots[:-1] + share * h, np.nextafter(knots[1:], -inf))
+    legs: Curve
+    start: float  # the time of the path that is 0 here
+    knots: Array  # the ends of the legs, shape (L + 1,)
+    moves: NDArray[np.bool_]  # whether the path moves in the leg, shape (L,)
+    x: Array  # shape (2, L)
+    slow: NDArray[np.bool_]  # whether c' = c'' = 0, shape (2, L)
+    rest: NDArray[np.bool_]  # whether ω or v is 0, shape (2, L, 1 or 2)
+    change: Array  # the largest change of a leg's velocity, as a share of its size, shape (L,)
 
-    def sizes(x: Array) -> Array:
-        return np.abs(x.reshape(*x.shape[:-1], halves, 3)).max(axis=-1)
+    def cell_counts(self) -> NDArray[np.intp]:
+        """Return the number of cells of each leg."""
+        L = int(np.count_nonzero(self.moves))
+        most, least = max(1000 // L, min(250, 4000 // L), 25), max(1000 // L, 4)
+        halvings = np.log2(_DENSE / np.clip(self.change, 1e-9, _DENSE)).astype(np.intp)
+        return np.where(self.moves, np.maximum(most >> halvings, least), 0)
 
-    probe = at(np.linspace(0, 1, 5)[:, None])
-    far = np.array([1.0, np.abs(path(probe)[..., :3, 3:]).max(initial=0)])[:halves]
-    v, a = (sizes(path(probe, k)) * h[:, None] ** k for k in (1, 2))
-    if (still := (v <= 1e-14 * far).all(axis=(0, 2))).any():
-        i = np.argmax(still)
-        between = f", between poses[{i}] and poses[{i + 1}]" if L > 1 else ""
-        raise ValueError(f"curve: the path stands still near s = {knots[i]:.6g}{between}")
+
+def _surveyed(curve: Curve, ends: Array) -> _Path:
+    """Return the legs of a path, and its stops; `ends` are the values of x at both ends."""
+    legs = curve.legs.flat if isinstance(curve, Chain) else curve.flat
+    times = curve.times if isinstance(curve, Chain) else np.array(curve.domain)
+    knots, h, L = times - times[0], legs.duration, legs.count
+    place = np.linspace(0, 1, 5)[:, None]
+    V, A = (legs.evaluate(place * h, k).reshape(5, L, -1, 3) for k in (1, 2))
+    d = legs.evaluate(place[::4] * h, 0)[..., :3, 3:]
+    far = np.array([1.0, np.abs(d).max(initial=0)])[: V.shape[2]]
+    v, a = np.abs(V).max(axis=-1) * h[:, None], np.abs(A).max(axis=-1) * h[:, None] ** 2
+    moves = (v > 1e-14 * far).any(axis=(0, 2))
+    if not moves.any():
+        raise ValueError("curve: the path stands still")
     rest = (v <= 1e-12 * v.max(axis=0) + 1e-14 * far)[[0, -1]]  # up to rounding
     slow = (rest & (a <= 1e-9 * a.max(axis=0) + 1e-12 * far)[[0, -1]]).all(axis=-1)
-    q = np.linspace(0, 1, n + 1)[:, None]
-    graded = q * q * (3 - 2 * q), q * q, 1 - (1 - q) ** 2
-    share = np.select([slow.all(axis=0), slow[0], slow[1]], graded, q + np.zeros(L))
-    t = at(share[:-1] + _PLACES * np.diff(share, axis=0)).swapaxes(1, 2)
-    V, A, R = path(t, 1), path(t, 2), path(t)[..., :3, :3]
-    each = V.reshape(*t.shape, halves, 3)
-    each[0, :, 0][rest[0]] = each[-1, :, -1][rest[1]] = 0
-    caps, corners = np.full(L * n + 1, inf), np.append(slow[0], False) | np.append(False, slow[1])
-    jumps = np.abs(each[0, 1:, 0] - each[-1, :-1, -1]).max(axis=-1)
-    corners[1:-1] |= (jumps > 1e-9 * sizes(V).max(axis=(0, 1, 2))).any(axis=-1)
-    caps[::n][corners] = 0
-    near = np.zeros((L, n, 1), bool)
-    near[rest[0].any(axis=-1), : n // 25] = near[rest[1].any(axis=-1), -(n // 25) :] = True
-    V, A, R = (x.reshape(len(x), L * n, *x.shape[3:]) for x in (V, A, R))
-    return np.append(t[0], knots[-1]), V, A, R, caps, near.reshape(-1, 1)
+    resting = rest.all(axis=-1)
+    jumps = np.abs(V[0, 1:] - V[-1, :-1]).max(axis=-1)
+    corner = (jumps > 1e-9 * np.abs(V).max(axis=(0, 1, 3))).any(axis=-1)
+    stop = corner | (resting[1, :-1] & resting[0, 1:]) | ~moves[1:] | ~moves[:-1]
+    x = np.full((2, L), np.nan)
+    x[0, 1:][stop] = x[1, :-1][stop] = 0
+    x[0, 0], x[1, -1] = ends
+    x[~np.isnan(x) & resting] = inf
+    x[slow] = 0
+    spread = np.abs(V - V[2]).max(axis=(0, 3))
+    size = np.abs(V).max(axis=(0, 3))
+    change = (spread / np.where(size > 0, size, 1)).max(axis=-1)
+    return _Path(legs, float(times[0]), knots, moves, x, slow, rest, change)
 
 
-def _two_passes(s: Array, Q: Array, caps: Array, ends: Array, moving: Array) -> Array:
-    """Return x on the grid; `ends` are the values of x at both ends, if the path moves there."""
-    A, B, C, D, E, F = Q
-    tops, cap, N = _tops(Q, caps).tolist(), caps.tolist(), len(s) - 1
+class _Grid:
+    """The cells of the moving legs: their legs, and their ends as shares of these legs."""
 
-    def listed(*rows: Array) -> list[list[list[float]]]:
-        cells: list[list[list[float]]] = np.stack(rows).transpose(1, 2, 0).tolist()
-        return cells
+    def __init__(self, path: _Path, counts: NDArray[np.intp], rows_of: Rows) -> None:
+        self.path, self.rows_of = path, rows_of
+        total = int(counts.sum())
+        _check_memory(total)
+        self.leg = np.repeat(np.arange(len(counts)), counts)
+        number = np.arange(total) - np.repeat(np.cumsum(counts) - counts, counts)
+        share: Array = np.stack([number, number + 1]) / counts[self.leg]
+        self.first, self.last = number == 0, number + 1 == counts[self.leg]
+        slow: NDArray[np.bool_] = path.slow[:, self.leg]
+        kinds = [slow.all(axis=0), slow[0], slow[1]]  # the cells are smaller near slow stops
+        graded = [share**2 * (3 - 2 * share), share**2, 1 - (1 - share) ** 2]
+        self.share = np.select(kinds, graded, share)
+        h = path.legs.duration[self.leg]
+        self.s = path.knots[self.leg] + self.share[0] * h
+        self.h = np.diff(self.share, axis=0)[0] * h
+        start, end = path.rest[:, self.leg].any(axis=-1)
+        self.near = (start & (share[1] <= 0.04)) | (end & (share[0] >= 0.96))
+        self.begins = self.first & ~np.isnan(path.x[0, self.leg])  # the first cells of pieces
+        self.ends = self.last & ~np.isnan(path.x[1, self.leg])
+        self.ellipses = lru_cache(maxsize=4)(self._ellipses)  # each pass needs all of them
 
-    first, last = ends.tolist()
-    there, back = listed(A, B, C, D, E, F), listed(C, B, A, E, D, F)
-    least = listed(A, -B, C, -D, E, F) if last > 0 else []
-    low, high = [0.0] * N + [last], [inf] * N + [last if moving[1] else cap[N]]
-    for i in range(N - 1, -1, -1):  # find the largest x from which the end can be reached
-        high[i] = min(_largest(there[i], max(min(high[i + 1], tops[i]), low[i + 1])), cap[i])
-        low[i] = max(0.0, -_largest(least[i], low[i + 1])) if low[i + 1] > 0 else 0.0
-        if high[i] == inf:
-            raise ValueError(f"limits: none of them bounds the speed near s = {s[i]:.6g}")
-        if low[i] > high[i] * (1 + 1e-9):
-            raise ValueError(f"rates[1] is out of reach: a limit is too low near s = {s[i]:.6g}")
-    x = [min(high[0], first) if moving[0] else high[0]]
-    if x[0] < max(low[0], first) * (1 - 1e-9):
-        why = "too low for rates[1]" if low[0] > x[0] else "too high to brake, or above a limit"
-        raise ValueError(f"rates[0] is {why}")
-    for i in range(N):
-        x.append(max(min(_largest(back[i], x[i]), high[i + 1]), low[i + 1], 0.0))
-    return np.array(x)
+    def stops(self, at: NDArray[np.bool_], end: int) -> dict[int, float]:
+        """Return the x at the stops of the cells that begin or end a piece."""
+        x = self.path.x[end, self.leg[at]]
+        return dict(zip(np.flatnonzero(at).tolist(), x.tolist(), strict=True))
+
+    def sampled(self, cells: slice, places: Array) -> tuple[Array, Array, Array]:
+        """Return V, A and R at places in the cells, shape (places, cells, ...)."""
+        low, high = self.share[:, cells, None]
+        shares = low * (1 - places) + high * places
+        own = np.repeat(self.leg[cells], len(places))
+
+        def values(order: int) -> Array:
+            found = evaluate_legs(self.path.legs, own, shares.ravel(), order)
+            return found.reshape(*shares.shape, *found.shape[1:]).swapaxes(0, 1)
+
+        return values(1), values(2), values(0)[..., :3, :3]
+
+    def _ellipses(self, start: int, stop: int) -> Array:
+        """Return the coefficients of the limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0.
+
+        In cells near rest, where b changes much, limits on speeds use its largest value in the
+        cell.
+        """
+        cells = slice(start, stop)
+        V, A, R = self.sampled(cells, _PLACES)
+        halves = V.reshape(3, stop - start, -1, 3)
+        leg, h, near = self.leg[cells], self.h[cells, None], self.near[cells, None]
+        halves[0][self.first[cells, None] & self.path.rest[0, leg]] = 0  # exactly, not to rounding
+        halves[2][self.last[cells, None] & self.path.rest[1, leg]] = 0
+        made = []
+        for name, a, b, k in self.rows_of(V, A, R):
+            held = np.linalg.norm(k, axis=-1).max(axis=0)
+            if (held >= 1).any():
+                where = f"to hold the body near s = {self.place(start + np.argmax(held >= 1)):.6g}"
+                raise ValueError(f"force: {held.max():.6g} times the limit is needed {where}")
+            if name in _SPEEDS:
+                b = np.where(near, b.max(axis=0), b)
+            g, q = a / (2 * h), _PLACES[:, None, None]
+            p, q, k = (np.tensordot(_CONTROL, x, 1) for x in ((1 - q) * b - g, q * b + g, k))
+            made.append(np.vecdot([p, p, q, p, q, k], [p, q, q, k, k, k]))
+            made[-1][5] -= 1
+        return np.concatenate(made, axis=1).swapaxes(1, 2)
+
+    def largest_shares(self, x: Array, y: Array) -> Array:
+        """Return, for each cell, the largest share of a limit between the places."""
+        most = np.zeros(len(x))
+        for part in reported("fastest, check", list(blocks(len(x), _BLOCK))):
+            x0, y0, h = x[part, None], y[part, None], self.h[part, None]
+            q = _CHECKED[:, None, None]
+            for name, a, b, k in self.rows_of(*self.sampled(part, _CHECKED)):
+                used = np.linalg.norm(
+                    a * (y0 - x0) / (2 * h) + b * (x0 + q * (y0 - x0)) + k, axis=-1
+                )
+                share = used.max(axis=0) ** (0.5 if name in _SPEEDS else 1)
+                most[part] = np.maximum(most[part], share)
+        return most
+
+    def timed(self, curve: Curve, x: Array, y: Array) -> Timed:
+        """Return the motion with the values x and y of s'² at the ends of the cells."""
+        at = np.arange(len(x)) + np.cumsum(self.begins) - 1  # each piece has one more point
+        stop, knots = at[self.ends] + 1, self.path.knots[self.leg[self.ends] + 1]
+        s, rate, steps = np.zeros((3, len(x) + len(stop)))
+        s[at], s[stop] = self.s, knots
+        rate[at], rate[stop] = np.sqrt(x), np.sqrt(y[self.ends])
+        steps[at + 1] = 2 * self.h / (np.sqrt(x) + np.sqrt(y))
+        if not self.path.moves[-1]:  # a pause at the end
+            s, rate, steps = (
+                np.append(s, self.path.knots[-1]),
+                np.append(rate, 0),
+                np.append(steps, 0),
+            )
+        times = np.cumsum(steps)
+        return Timed(duration=times[-1], curve=curve, s=s, rate=rate, times=times)
+
+    def place(self, cell: np.intp | int) -> float:
+        """Return the time of the path at the start of a cell."""
+        return float(self.s[cell]) + self.path.start
 
 
-def _ellipses(h: Array, rows: list[Row], near: Array) -> Array:
-    """Return the coefficients of the limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0.
-
-    In cells near rest, where b changes much, limits on speeds use its largest value in the cell.
-    """
-    made = []
-    for name, a, b, k in rows:
-        if name in _SPEEDS:
-            b = np.where(near, b.max(axis=0), b)
-        g = a / (2 * h[:, None])
-        parts = (1 - _PLACES) * b - g, _PLACES * b + g, k
-        p, q, k = (np.tensordot(_CONTROL, part, 1) for part in parts)
-        made.append(np.vecdot([p, p, q, p, q, k], [p, q, q, k, k, k]))
-        made[-1][5] -= 1
-    return np.concatenate(made, axis=1).swapaxes(1, 2)
+def _check_memory(cells: int) -> None:
+    """Raise MemoryError if the cells of a path need more memory than the computer has."""
+    pages = getattr(os, "sysconf_names", {}).get("SC_PHYS_PAGES")
+    most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if pages else 2**33
+    if cells * _MEMORY > most:
+        raise MemoryError(
+            f"curve: {cells} cells of the path need {cells * _MEMORY / 1e9:.1f} GB of memory, "
+            f"and this computer has {most / 1e9:.1f} GB; divide the path"
+        )
 
 
-def _tops(Q: Array, caps: Array) -> Array:
+def _two_passes(grid: _Grid) -> tuple[Array, Array]:
+    """Return s'² at the start and at the end of each cell."""
+    count = len(grid.s)
+    parts = list(blocks(count, _BLOCK))
+    begins, ends = grid.stops(grid.begins, 0), grid.stops(grid.ends, 1)
+    high, low = np.empty(count), np.empty(count)
+    most, least = 0.0, 0.0
+    for part in reported("fastest, first pass", parts[::-1]):
+        Q = grid.ellipses(part.start, part.stop)
+        A, B, C, D, E, F = Q
+        tops, there = _tops(Q).tolist(), _listed(Q)
+        for i in range(part.stop - 1, part.start - 1, -1):
+            j = i - part.start
+            if i in ends:
+                most = ends[i]
+                least = most if most < inf else 0.0
+            y = max(min(most, tops[j]), least)
+            if least > 0:  # the motion is still fast at the end of the path
+                mirrored = np.stack([A[j], -B[j], C[j], -D[j], E[j], F[j]], axis=-1).tolist()
+                least = max(0.0, -_largest(mirrored, least))
+            most = _largest(there[j], y)
+            if min(most, begins.get(i, inf)) == inf:
+                raise ValueError(
+                    f"limits: none of them bounds the speed near s = {grid.place(i):.6g}"
+                )
+            if least > most * (1 + 1e-9):
+                where = f"a limit is too low near s = {grid.place(i):.6g}"
+                raise ValueError(f"rates[1] is out of reach: {where}")
+            high[i], low[i] = most, least
+    x, y = np.empty(count), np.empty(count)
+    for part in reported("fastest, second pass", parts):
+        A, B, C, D, E, F = grid.ellipses(part.start, part.stop)
+        back = _listed(np.stack([C, B, A, E, D, F]))
+        for i in range(part.start, part.stop):
+            if i in begins:
+                wanted = begins[i] if begins[i] < inf else 0.0
+                here = float(min(high[i], begins[i]))
+                if here < max(low[i], wanted) * (1 - 1e-9):
+                    why = (
+                        "too low for rates[1]"
+                        if low[i] > here
+                        else "too high to brake, or above a limit"
+                    )
+                    raise ValueError(f"rates[0] is {why}")
+            if i in ends:
+                most = ends[i]
+                least = most if most < inf else 0.0
+            else:
+                most, least = high[i + 1], low[i + 1]
+            x[i] = here
+            y[i] = here = float(max(min(_largest(back[i - part.start], here), most), least, 0.0))
+    return x, y
+
+
+def _listed(Q: Array) -> list[list[list[float]]]:
+    """Return the coefficients by cell and limit, as lists: Python is faster than NumPy for rows."""
+    cells: list[list[list[float]]] = Q.transpose(1, 2, 0).tolist()
+    return cells
+
+
+def _tops(Q: Array) -> Array:
     """Return, for each cell, the y with the largest x + y, where x is as large as y allows.
 
     This y is found by bisection of its logarithm.
     """
     A, B, C, D, E, F = Q
     free = A == 0  # the limit does not depend on x
-    low, high = np.full((len(A), 1), 1e-60), np.minimum(caps[1:], 1e60)[:, None]
+    low, high = np.full((len(A), 1), 1e-60), np.full((len(A), 1), 1e60)
     for _ in range(50):
         y = np.sqrt(low * high)
         t, G = B * y + D, (C * y + 2 * E) * y + F
@@ -429,9 +601,9 @@ def _tops(Q: Array, caps: Array) -> Array:
             x = most[i][:, None]
             rises = ((A - B) * x + (B - C) * y + D - E)[i][:, None] > 0
         allowed = np.where(free, G <= 0, square >= 0).all(axis=1, keepdims=True)
-        allowed &= (x >= least.max(axis=1, keepdims=True)) & (x >= 0) & (x < caps[:-1, None])
+        allowed &= (x >= least.max(axis=1, keepdims=True)) & (x >= 0)
         low, high = np.where(allowed & rises, y, low), np.where(allowed & rises, high, y)
-    return np.minimum(low[:, 0], caps[1:])
+    return low[:, 0]
 
 
 def _largest(ellipses: list[list[float]], y: float) -> float:

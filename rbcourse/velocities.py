@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_inertia, as_single
-from rbcourse._numerics import EPS, Array, matvec
+from rbcourse._numerics import Array, matvec
 from rbcourse.conversions import quaternion_from_matrix
 from rbcourse.metrics import weight_of
 from rbcourse.se3 import check_path
@@ -40,7 +40,6 @@ PathEnds = str | tuple[ArrayLike | None, ArrayLike | None]
 
 _SHORTEST, _LONGEST = 1e-100, 1e100  # limits of a duration
 _NEAR_HALF_TURN = 1e-6
-_EQUAL = 1e-12
 
 
 def spline_velocities(
@@ -220,19 +219,16 @@ def as_ends(ends: PathEnds | Conditions, count: int, size: int) -> Conditions:
     return Conditions(fixed, given)
 
 
-def resting_spline(times: Array, poses: Array) -> tuple[Array, Array]:
+def resting_spline(times: Array, poses: Array, rest_at: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return (w, Rᵀ d') and (w', Rᵀ d'') at the poses; for rotations, only w and w'.
 
-    All of them are 0 at both ends and where two successive poses are equal up to rounding.
+    All of them are 0 at the poses `rest_at`, shape (N,).
     """
-    change, far = np.abs(np.diff(poses, axis=0)), np.abs(poses[:, :3, 3:]).max(initial=0)
-    same = np.all(change[:, :3, :3] <= _EQUAL, axis=(1, 2))
-    same &= np.all(change[:, :3, 3:] <= 64 * EPS * far, axis=(1, 2))
-    rests, found = np.append(True, same) | np.append(same, True), []
+    found = []
     for system in _systems(np.diff(times), poses):
-        x = system.solve(Conditions(rests, np.zeros((len(poses), 3))))
+        x = system.solve(Conditions(rest_at, np.zeros((len(poses), 3))))
         starts = system.b0 - matvec(system.A, x[:-1]) - matvec(system.B, x[1:])
-        found.append([x, np.where(rests[:, None], 0, np.append(starts, 0 * x[:1], axis=0))])
+        found.append([x, np.where(rest_at[:, None], 0, np.append(starts, 0 * x[:1], axis=0))])
     velocities, accelerations = np.concatenate(found, axis=-1)
     return velocities, accelerations
 

@@ -86,12 +86,43 @@ def test_a_chain_meets_its_poses(leg, poses):
 
 
 @every_leg
-def test_a_chain_rests_between_equal_neighbouring_poses(leg):
+def test_a_chain_rests_where_this_is_requested(leg):
+    """Between two rests at the same pose, the curve stands still."""
     poses = own_poses(leg)[[0, 1, 2, 2, 3]]
-    poses[3, :3, :3] @= rb.exp_so3([1e-15, 0, 0])
-    c = rb.chain(range(5), poses, leg=leg)
-    assert np.abs(c([2.1, 2.5, 2.9]) - poses[2]).max() < 40 * EPS
-    assert np.abs(c([2.1, 2.5, 2.9], 1)).max() < 1e-13
+    if leg in WITHOUT_VELOCITIES:
+        with pytest.raises(ValueError, match="rest_at: the legs take no velocities"):
+            rb.chain(range(5), poses, leg=leg, rest_at=[2])
+        assert np.abs(rb.chain(range(5), poses, leg=leg)([2.1, 2.5, 2.9], 1)).max() < 1e-13
+        return
+    for rest_at in ([2, 3], np.array([3, -3]), "repeated"):
+        c = rb.chain(range(5), poses, leg=leg, rest_at=rest_at)
+        resting = np.abs(c(range(5), 1)).max(axis=1) < 100 * EPS
+        assert resting.tolist() == [True, False, True, True, True]
+        assert np.abs(c([2.1, 2.5, 2.9]) - poses[2]).max() < 40 * EPS
+        assert np.abs(c([2.1, 2.5, 2.9], 1)).max() < 1e-13
+    one = rb.chain(range(5), own_poses(leg)[:5], leg=leg, rest_at=[2])
+    resting = np.abs(one(range(5), 1)).max(axis=1) < 100 * EPS
+    assert resting.tolist() == [True, False, True, False, True]
+
+
+@both_groups
+def test_a_repeated_pose_is_an_ordinary_pose(poses):
+    """The curve depends continuously on the poses, and its acceleration is continuous."""
+    poses = poses[[0, 1, 2, 2, 3]]
+    other = poses.copy()
+    other[3, :3, :3] @= oracles.exp_so3([1e-9, 0, 0])
+    c, near = rb.chain(range(5), poses), rb.chain(range(5), other)
+    assert np.abs(c.velocities - near.velocities).max() < 1e-7
+    assert np.abs(c.jumps(2)).max() < 1e-12
+    assert rb.acceleration_cost(c) == pytest.approx(rb.acceleration_cost(near), rel=1e-7)
+
+
+@pytest.mark.parametrize("rest_at", ["pauses", [9], [-10], [1.0], 3, [[1]]])
+def test_a_wrong_request_for_a_rest_is_refused(rest_at):
+    with pytest.raises(ValueError, match="rest_at: indices"):
+        rb.chain(TIMES, POSES, rest_at=rest_at)
+    with pytest.raises(ValueError, match="rest_at: the velocities are given"):
+        rb.chain(TIMES, POSES, TWISTS, rest_at=[1])
 
 
 @pytest.mark.parametrize("ratio", [1, 100, 1e4])
@@ -304,14 +335,7 @@ def test_moving_a_chain_far_from_the_origin_keeps_the_motion():
     assert np.abs(rb.chain(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
 
 
-def test_a_chain_rests_between_equal_poses_in_every_frame():
-    """Poses that differ only by rounding errors count as equal, also at the origin of the frame."""
-    stay = POSES[[0, 1, 1, 2]]
-    for frame in (np.eye(4), rb.inverse_se3(POSES[1]), POSES[4]):
-        seen = frame @ stay
-        seen[2] = (frame @ POSES[5]) @ (rb.inverse_se3(POSES[5]) @ stay[2])
-        seen[:, :3, :3] = rb.project_so(seen[:, :3, :3])
-        assert not rb.chain(range(4), seen).velocities[1:3].any()
+def test_small_turns_and_turns_near_a_half_turn_are_accurate():
     near_half_turn = np.pi + 1e-6 - 1e-5
     R = rb.exp_so3(np.outer([0, 1e-6, 2e-6, near_half_turn], [0, 0, 1]))
     assert np.abs(rb.chain(range(3), R[:3]).velocities[1] - [0, 0, 1.5e-6]).max() < 1e-12

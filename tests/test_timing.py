@@ -1,8 +1,10 @@
 """Check the fastest timing by formulas, other programs, limits at many times, and symmetries."""
 
 import re
+import tracemalloc
 from itertools import pairwise
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import oracles
@@ -140,7 +142,7 @@ OPTIMA = {
 
 @pytest.mark.parametrize("name", OPTIMA)
 def test_no_timing_on_the_same_cells_is_faster(name, monkeypatch):
-    monkeypatch.setattr(timing, "FINER", (1,))
+    monkeypatch.setattr(timing, "REFINEMENTS", 0)
     monkeypatch.setattr(timing, "TOLERANCE", 0.1)
     for seed, T in enumerate(OPTIMA[name]):
         found = rb.fastest(random_chain(seed), **SETS[name]).domain[1]
@@ -225,6 +227,101 @@ def test_the_least_time_has_the_symmetries_of_the_problem(name):
         same += [rb.fastest(rb.chain(t, far), **theirs)]
     assert [x.domain[1] / T for x in same] == pytest.approx(np.ones(len(same)), rel=1e-12)
     assert rb.fastest(c, **faster(1.7)).domain[1] * 1.7 == pytest.approx(T, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_least_time_does_not_depend_on_the_clock(name):
+    """Shift and scale the times. A shift loses the digits of the times below its ulp."""
+    c, limits = random_chain(8), SETS[name]
+    poses, T = c(c.times), rb.fastest(c, **limits).domain[1]
+    for shift, tolerance in ((0, 1e-12), (1e3, 1e-11), (1e6, 1e-9), (1.7e9, 1e-6)):
+        for unit in (1, 1e3):
+            later = rb.chain(unit * c.times + shift, poses)
+            timed = rb.fastest(later, **limits)
+            assert timed.domain[1] == pytest.approx(T, rel=tolerance)
+            there = timed.times[np.searchsorted(timed.s, later.times - later.times[0])]
+            assert np.abs(timed(there) - poses).max() < 1e-12
+    short = rb.chain(1e-3 * c.times, poses)
+    assert rb.fastest(short, **limits).domain[1] == pytest.approx(T, rel=1e-12)
+
+
+def test_shares_of_limits_do_not_depend_on_the_clock():
+    c = random_chain(8)
+    used = rb.limits_used(c, **NORMS)
+    for shift, tolerance in ((1e3, 1e-11), (1e6, 1e-8), (1.7e9, 1e-5)):
+        later = rb.limits_used(rb.chain(c.times + shift, c(c.times)), **NORMS)
+        for limit, (share, when) in used.items():
+            assert later[limit] == pytest.approx((share, when + shift), rel=tolerance)
+
+
+def recording(seed, count):
+    """Return the poses of a smooth motion, sampled at 200 Hz."""
+    rng, t = np.random.default_rng([53, seed]), np.arange(count) / 200
+    waves = rng.normal(size=(3, 6)) * [[0.3], [0.2], [0.05]]
+    phases = np.multiply.outer(t, [0.7, 1.9, 4.6])[..., None] + rng.uniform(0, 6, (3, 6))
+    return t, rb.pose_from_coordinates(np.sum(waves * np.sin(phases), axis=1))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_pause_of_a_recording_takes_no_time(seed):
+    """Repeat the first, the last and an inner pose; the body has to stop at the inner pose."""
+    t, poses = recording(seed, 60)
+    stop = 20 + 5 * seed
+    times = np.arange(60 + 100) / 200
+    paused = np.concatenate([poses[[0] * 30], poses[: stop + 1], poses[[stop] * 20]])
+    paused = np.concatenate([paused, poses[stop + 1 :], poses[[-1] * 50]])
+    pausing = rb.chain(times, paused, rest_at="repeated")
+    T = rb.fastest(rb.chain(t, poses, rest_at=[stop]), **NORMS).domain[1]
+    timed = rb.fastest(pausing, **NORMS)
+    assert timed.domain[1] == pytest.approx(T, rel=1e-9)
+    there = timed.times[np.searchsorted(timed.s, pausing.times)]
+    assert np.abs(timed(there) - paused).max() < 1e-12
+    both = [rb.chain(t[part], poses[part]) for part in (slice(stop + 1), slice(stop, None))]
+    apart = sum(rb.fastest(c, **NORMS).domain[1] for c in both)
+    assert apart == pytest.approx(T, rel=5e-3)  # the leg next to a stop has other velocities
+
+
+def test_the_times_of_legs_between_stops_do_not_matter():
+    """After a rest, the motion may continue at another s', because the velocity is 0."""
+    poses = rb.pose_from_coordinates(np.random.default_rng(9).uniform(-1, 1, (3, 6)))
+    T = [
+        rb.fastest(rb.chain([0, 1, 1 + h], poses, rest_at=[1]), **NORMS).domain[1]
+        for h in (1, 30, 1e-3)
+    ]
+    assert T[1:] == pytest.approx([T[0]] * 2, rel=1e-12)
+
+
+def test_a_recording_needs_little_memory():
+    t, poses = recording(0, 2000)
+    path = rb.chain(t, poses)
+    tracemalloc.start()
+    timed = rb.fastest(path, **NORMS)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2000 * 20e3
+    assert len(timed.s) < 6 * 2000
+    with mock.patch.object(timing, "_check_memory", wraps=timing._check_memory) as checked:
+        rb.fastest(path, acceleration=1, angular_acceleration=1)
+    assert checked.call_args.args[0] == pytest.approx(4 * 2000, rel=0.1)
+    with pytest.raises(MemoryError, match="divide the path"):
+        timing._check_memory(10**13)
+
+
+def test_a_long_calculation_shows_its_progress(capsys, monkeypatch):
+    clock = iter(range(0, 10**6, 7))
+    monkeypatch.setattr(timing.reported.__globals__["time"], "monotonic", lambda: next(clock))
+    list(timing.reported("work", range(3)))
+    assert capsys.readouterr().err == "work: 33%\nwork: 67%\n"
+
+
+def test_a_short_peak_of_a_limit_is_found():
+    """One of 20,001 times is in a leg that takes a ten-thousandth of the duration."""
+    turns = np.array([0, 0.1, 0.2, 0.3])
+    times = [0, 1, 1 + 1e-4, 2]
+    c = rb.chain(times, rb.exp_so3(turns[:, None] * [0, 0, 1]), np.zeros((4, 3)))
+    (share, when) = rb.limits_used(c, angular_speed=1)["angular_speed"]
+    assert share == pytest.approx(c(1 + 5e-5, 1)[2])
+    assert when == pytest.approx(1 + 5e-5, abs=1e-6)
 
 
 @pytest.mark.parametrize("size", [3, 4])
@@ -315,7 +412,7 @@ REFUSED = [
         "force: 1.09 times the limit is needed to hold the body near s = 0",
     ),
     (UP, {"angular_acceleration": 1}, "none of them bounds the speed near s = "),
-    (rb.chain([0, 1, 2], [I4, LINE, LINE]), MOVING, r"near s = 1, between poses\[1\] and poses\[2"),
+    (rb.geodesic_se3(LINE, LINE), MOVING, "curve: the path stands still"),
     (
         rb.geodesic_so3(np.eye(3), CORNERS),
         SPINNING,
@@ -344,10 +441,13 @@ def test_an_unknown_limit_is_refused():
 
 
 def test_a_limit_that_is_exceeded_between_the_points_gives_a_warning(monkeypatch):
-    monkeypatch.setattr(timing, "FINER", (1,))
+    monkeypatch.setattr(timing, "REFINEMENTS", 0)
     c = random_chain(0)
     steps = np.diff(c.times) * [1, 1e-3, *np.ones(len(c.times) - 3)]  # the path runs off and back
     uneven = rb.chain(np.append(0, np.cumsum(steps)), c(c.times))
     with pytest.warns(RuntimeWarning, match="a limit is exceeded by .* near s = ") as told:
-        rb.fastest(uneven, **NORMS)
-    assert float(str(told[0].message).split()[-1]) == pytest.approx(steps[0], abs=0.05)
+        timed = rb.fastest(uneven, **NORMS)
+    place = float(str(told[0].message).split()[-1])
+    i = np.argmin(np.abs(timed.s - place))
+    t = np.linspace(timed.times[i], timed.times[i + 1], 101)
+    assert np.linalg.norm(timed(t, 1)[:, :3], axis=1).max() > 1.5 * (1 + 1e-4)
