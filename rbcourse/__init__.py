@@ -20,8 +20,11 @@ ValueError that names it. So does a matrix that is not symmetric or positive def
 required. Batch shapes that do not broadcast also raise ValueError. The docstrings name the other
 errors.
 
-Unless a docstring says so, functions do not check that rotation matrices and poses are valid;
-`project_so` and `project_se` return the nearest valid ones. The last row of a pose is ignored.
+Rotation matrices, poses and unit quaternions must be valid. A deviation of at most 1e-9 is
+accepted, and one of at most 1e-6, as of numbers in single precision, is removed by projection. A
+larger deviation raises a ValueError that states it; `project_so`, `project_se` and
+`project_quaternion` return the nearest valid arguments. SciPy's ``Rotation`` and ``RigidTransform``
+are accepted in place of matrices. All results are NumPy arrays in double precision.
 Angles are in rad, and lengths in m. Angular velocities and twists (ω, v) are in the body frame, per
 unit of time.
 """

@@ -24,9 +24,11 @@ def as_array(
     matches any size ≥ 1, repeated letters match the same size, and "n+1" matches any size ≥ 2. For
     example, ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes are
     batch axes; with ``stacked=False``, no batch axis is allowed. Entries may be NaN or infinite.
-    With ``copy=False``, the result may be the input.
+    With ``copy=False``, the result may be the input. Objects with a method ``as_matrix``, such as
+    SciPy's ``Rotation`` and ``RigidTransform``, are replaced by their matrices.
     """
     given: Any
+    value = _matrices_of(value)
     parts: Any = value if isinstance(value, list | tuple) else [value]
     ma = sys.modules.get("numpy.ma")  # if numpy.ma is not loaded, no array is masked
     if ma and any(isinstance(part, ma.MaskedArray) for part in parts):
@@ -43,7 +45,8 @@ def as_array(
         raise ValueError(f"{name}: real numbers are wanted, got dtype {given.dtype}")
     if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
         wanted = ", ".join([*["..."] * stacked, *map(str, core)])
-        raise ValueError(f"{name}: shape ({wanted}) is wanted, got {given.shape}")
+        hint = _hint(core, given.shape)
+        raise ValueError(f"{name}: shape ({wanted}) is wanted, got {given.shape}{hint}")
     array: Array = given.astype(np.float64, copy=copy)
     return array
 
@@ -228,6 +231,31 @@ def check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -
     if not passes.all():
         value = array[~passes][0]
         raise ValueError(f"{first_index(name, ~passes)} is {value}, {wanted} is wanted")
+
+
+def _matrices_of(value: Any) -> Any:
+    """Return the matrices of an object, or of a list of objects, that has ``as_matrix``."""
+    if hasattr(value, "as_matrix"):
+        return value.as_matrix()
+    if isinstance(value, list | tuple) and any(hasattr(part, "as_matrix") for part in value):
+        return [_matrices_of(part) for part in value]
+    return value
+
+
+def _hint(core: tuple[int | str, ...], shape: tuple[int, ...]) -> str:
+    """Name the function that makes matrices of the given arrays, if there is one."""
+    if core not in ((3, 3), (4, 4), ("n", "n")) or not shape:
+        return ""
+    converters = {
+        3: "exp_so3 makes rotations of rotation vectors",
+        4: "matrix_from_quaternion makes rotations of quaternions (w, x, y, z)",
+        6: "pose_from_coordinates makes poses of rotation vectors and positions",
+        7: "pose_from_components makes poses of rotations and positions",
+    }
+    if core == (4, 4) and shape[-2:] == (3, 3):
+        return "; pose_from_components makes poses of rotations and positions"
+    converter = converters.get(shape[-1])
+    return f"; {converter}" if converter and shape[-2:] not in ((3, 3), (4, 4)) else ""
 
 
 def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:

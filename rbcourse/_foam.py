@@ -54,7 +54,7 @@ def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
     if not 1e-30 < norm2.min() <= norm2.max() < 1e30:  # avoids overflow of norm2**6
         M[...] = scaled(M, axis=(0, 1))
         norm2 = _dots(M, M)
-    _write_cofactors(M, C)
+    write_cofactors(M, C)
     a, cof2, det = norm2 / 3, _dots(C, C), _dots(M[:1], C[:1])
     r2 = np.maximum(a * a - cof2 / 3, 1e-200)
     r = np.sqrt(r2)
@@ -66,10 +66,10 @@ def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
     zeta = gap * (s1 * lam + det / s1)
     np.multiply(M, lam, X)
     X += C
-    _write_cofactors(X, C)
+    write_cofactors(X, C)
     M *= zeta
     M += C
-    _write_cofactors(M, C)
+    write_cofactors(M, C)
     C *= (zeta * lam) ** 2 / _dots(M[:1], C[:1])
     C += M
     C *= 0.5 / (zeta * lam)
@@ -77,7 +77,7 @@ def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
     return right
 
 
-def _write_cofactors(M: Array, C: Array) -> None:
+def write_cofactors(M: Array, C: Array) -> None:
     """Write the cofactors of M into C."""
     for i in range(3):
         (a, b, c), (d, e, f), (x, y, z) = M[i - 2], M[i - 1], C[i]

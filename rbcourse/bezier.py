@@ -16,7 +16,7 @@ from rbcourse._taylor import (
     slerp,
     times,
 )
-from rbcourse.conversions import quaternion_from_matrix, quaternion_from_rotation_vector
+from rbcourse.conversions import quaternion_from_rotation_vector, quaternion_of
 from rbcourse.curves import (
     Ends,
     QuaternionCurve,
@@ -24,7 +24,7 @@ from rbcourse.curves import (
     other_way,
 )
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
-from rbcourse.so3 import exp_so3, log_so3
+from rbcourse.so3 import exp_so3, log
 
 Legs = tuple[Array, Array, Array]
 
@@ -131,7 +131,7 @@ def cumulative_bezier_so3(
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
     halves = np.stack(bezier_legs(ends), axis=-2) / 2
-    return CumulativeBezier(duration=T, start=quaternion_from_matrix(ends.R0), controls=halves)
+    return CumulativeBezier(duration=T, start=quaternion_of(ends.R0), controls=halves)
 
 
 def corrected_bezier_so3(
@@ -172,7 +172,7 @@ def corrected_bezier_so3(
     """
     ends, T, legs = _slow_ends(R0, R1, w0, w1, duration)
     curve = _bezier(ends, T, legs)
-    sigma = nearest_turn(log_so3(ends.turn), legs[0] + legs[1] + legs[2])
+    sigma = nearest_turn(log(ends.turn), legs[0] + legs[1] + legs[2])
     deviation = bezier_deviation(sigma, *seen_from_the_middle(sigma, ends.w0, ends.w1))
     middle = quaternion_from_rotation_vector(sigma / 2)
     points = quaternion_multiply(quaternion_conjugate(middle)[..., None, :], curve.controls)
@@ -187,7 +187,7 @@ def corrected_bezier_so3(
 def bezier_legs(ends: Ends) -> Legs:
     """Return the shortest turns from each Bézier control point to the next."""
     first, last = ends.w0 / 3, ends.w1 / 3
-    return first, log_so3(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
+    return first, log(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
 
 
 def _slow_ends(
@@ -279,9 +279,7 @@ def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
     points = [np.broadcast_to(np.eye(4)[0], (*T.shape, 4))]
     for leg in legs:
         points.append(quaternion_multiply(points[-1], quaternion_from_rotation_vector(leg)))
-    return Bezier(
-        duration=T, start=quaternion_from_matrix(ends.R0), controls=np.stack(points, axis=-2)
-    )
+    return Bezier(duration=T, start=quaternion_of(ends.R0), controls=np.stack(points, axis=-2))
 
 
 class CorrectedBezier(Bezier):

@@ -21,7 +21,7 @@ from rbcourse._taylor import (
     exp,
 )
 from rbcourse.bezier import bezier_so3, corrected_bezier_so3, cumulative_bezier_so3
-from rbcourse.conversions import quaternion_from_matrix
+from rbcourse.conversions import quaternion_of
 from rbcourse.curves import (
     Curve,
     Ends,
@@ -37,7 +37,7 @@ from rbcourse.curves import (
 )
 from rbcourse.projected_cubic import ends_of_quintic, projected_cubic_so3
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
-from rbcourse.so3 import hat, log_so3, right_jacobian_inverse_so3
+from rbcourse.so3 import hat, log, right_jacobian_inverse_so3
 
 
 def exponential_cubic_so3(
@@ -73,7 +73,7 @@ def exponential_cubic_so3(
     array([0., 1., 0.])
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
-    return _exponential_cubic(ends, T, log_so3(ends.turn))
+    return _exponential_cubic(ends, T, log(ends.turn))
 
 
 def exponential_cubic_long_so3(
@@ -98,14 +98,14 @@ def exponential_cubic_long_so3(
 
     Examples
     --------
-    >>> from rbcourse import exp_so3
+    >>> from rbcourse import exp_so3, log_so3
     >>> c = exponential_cubic_long_so3(np.eye(3), exp_so3([0, 0, 3]), [0, 0, -4], [0, 0, -4])
     >>> log_so3(c([0.25, 0.75])).round(2) + 0.0
     array([[ 0.  ,  0.  , -0.89],
            [ 0.  ,  0.  , -2.4 ]])
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
-    return _exponential_cubic(ends, T, other_way(log_so3(ends.turn)))
+    return _exponential_cubic(ends, T, other_way(log(ends.turn)))
 
 
 def quaternion_cubic_so3(
@@ -149,7 +149,7 @@ def quaternion_cubic(
     ends: Ends, T: Array, long: NDArray[np.bool_] | bool = False
 ) -> QuaternionCubic:
     """Return the quaternion cubic for checked ends; if `long`, it turns the long way round."""
-    turn, one = quaternion_from_matrix(ends.turn), np.ones(T.shape)
+    turn, one = quaternion_of(ends.turn), np.ones(T.shape)
     turn = np.where(np.expand_dims(long, -1), -turn, turn)
     return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
 
@@ -188,7 +188,7 @@ def cayley_cubic_so3(
     array([0., 1., 0.])
     """
     ends, T = Ends(R0, R1, w0, w1).over(duration)
-    turn = quaternion_from_matrix(ends.turn)
+    turn = quaternion_of(ends.turn)
     infinite = np.flatnonzero(turn[..., 0] == 0)
     if len(infinite):
         curve = which_curve(infinite[0], T.shape)
@@ -248,14 +248,14 @@ def normal_cubic_so3(
     ends, G = with_inertia(Ends(R0, R1, w0, w1), inertia)
     ends, T = ends.over(duration)
     G = np.broadcast_to(G, (*T.shape, 3, 3))
-    inverse, turn = np.linalg.inv(G), log_so3(ends.turn)
+    inverse, turn = np.linalg.inv(G), log(ends.turn)
     goal, by_goal = _normal_coordinates(turn, G, inverse)
     rate = right_jacobian_inverse_so3(turn) @ ends.w1[..., None]
     end_rate = np.linalg.solve(by_goal, rate)[..., 0]
     cubic = np.stack([np.zeros_like(turn), goal, ends.w0, end_rate], axis=-2)
     return NormalCubic(
         duration=T,
-        start=quaternion_from_matrix(ends.R0),
+        start=quaternion_of(ends.R0),
         controls=np.concatenate([cubic, G, inverse], axis=-2),
     )
 
@@ -299,7 +299,7 @@ def exponential_quintic_so3(
     array([0., 0., 2.])
     """
     ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
-    curve = _exponential_cubic(ends, T, log_so3(ends.turn))
+    curve = _exponential_cubic(ends, T, log(ends.turn))
     turn, end_rate = 2 * curve.controls[..., 1, :], 2 * curve.controls[..., 3, :]
     straight = exp([np.moveaxis(x, -1, 0) / 2 for x in (turn, end_rate, 0 * end_rate)])
     w_rate = np.moveaxis(angular_velocity(straight), 0, -1)
@@ -339,7 +339,7 @@ class ExponentialQuintic(ExponentialCubic):
 def _exponential_cubic(ends: Ends, T: Array, turn: Array) -> ExponentialCubic:
     end_rate = matvec(right_jacobian_inverse_so3(turn), ends.w1)
     controls = np.stack([np.zeros_like(turn), turn, ends.w0, end_rate], axis=-2) / 2
-    return ExponentialCubic(duration=T, start=quaternion_from_matrix(ends.R0), controls=controls)
+    return ExponentialCubic(duration=T, start=quaternion_of(ends.R0), controls=controls)
 
 
 class NormalCubic(QuaternionCurve):
@@ -400,7 +400,7 @@ def _cubic_from_the_goal(
     start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
     end_rate = growth[..., None] * one + _rate(one, ends.w1)
     cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate
-    goal = quaternion_multiply(quaternion_from_matrix(ends.R0), turn)
+    goal = quaternion_multiply(quaternion_of(ends.R0), turn)
     return {"duration": T, "start": goal, "controls": np.stack(cubic, axis=-2)}
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_symmetric, check_broadcast, first_index
 from rbcourse._numerics import EPS, Array, scaled
-from rbcourse.metrics import as_rotation_or_pose
+from rbcourse._valid import as_rotations_or_poses
 from rbcourse.projection import project_se, project_so
 from rbcourse.se3 import BASIS_SE3
 from rbcourse.so3 import BASIS_SO3
@@ -178,7 +178,7 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     >>> w[:, 1].round(1)  # it flips
     array([ 3., -3.])
     """
-    A0, m = as_rotation_or_pose("A0", A0)
+    A0, m = as_rotations_or_poses("A0", A0)
     G, v0, times = as_symmetric("G", G, m), as_finite("v0", v0, m), as_finite("t", t)
     batch = check_broadcast(G=(G, 2), A0=(A0, 2), v0=(v0, 1))
     basis, project = (BASIS_SO3, project_so) if m == 3 else (BASIS_SE3, project_se)

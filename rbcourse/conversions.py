@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import as_finite
 from rbcourse._numerics import EPS, Array
 from rbcourse._taylor import matrix
+from rbcourse._valid import as_rotations, as_unit_quaternions
 from rbcourse.quaternion import canonical_quaternion
 
 
@@ -19,7 +20,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions. A quaternion of another norm n gives n² R.
+        Unit quaternions.
 
     Returns
     -------
@@ -32,7 +33,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    return matrix(np.moveaxis(as_finite("q", q, 4), -1, 0))
+    return matrix(np.moveaxis(as_unit_quaternions("q", q), -1, 0))
 
 
 def quaternion_from_matrix(R: ArrayLike) -> Array:
@@ -56,7 +57,12 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     >>> quaternion_from_matrix([[-1, 0, 0], [0, -1, 0], [0, 0, 1]])
     array([0., 0., 0., 1.])
     """
-    four_qq = _four_outer(as_finite("R", R, 3, 3))
+    return quaternion_of(as_rotations("R", R))
+
+
+def quaternion_of(R: Array) -> Array:
+    """Compute `quaternion_from_matrix` without checks."""
+    four_qq = _four_outer(R)
     largest = np.argmax(np.diagonal(four_qq, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(four_qq, largest[..., None, None], axis=-2)[..., 0, :]
     return canonical_quaternion(row / np.linalg.norm(row, axis=-1, keepdims=True))
@@ -120,6 +126,11 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     >>> rotation_vector_from_quaternion([-(0.5**0.5), 0, 0, -(0.5**0.5)]) + 0.0
     array([0.        , 0.        , 1.57079633])
     """
+    return rotation_vector_of(as_unit_quaternions("q", q))
+
+
+def rotation_vector_of(q: Array) -> Array:
+    """Compute `rotation_vector_from_quaternion` without checks."""
     q = canonical_quaternion(q)
     w, v = q[..., :1], q[..., 1:]
     sine = np.linalg.norm(v, axis=-1, keepdims=True)
@@ -226,7 +237,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     >>> zyx_from_quaternion([0.5, -0.5, 0.5, 0.5]).round(4)  # locked: 90° about z, 90° about y
     array([1.5708, 1.5708, 0.    ])
     """
-    w, x, y, z = np.moveaxis(as_finite("q", q, 4), -1, 0)
+    w, x, y, z = np.moveaxis(as_unit_quaternions("q", q), -1, 0)
     minus, plus = 2 * np.arctan2(z - x, w + y), 2 * np.arctan2(z + x, w - y)
     up, down = np.hypot(w + y, z - x), np.hypot(w - y, z + x)
     lock_up, lock_down = down < 8 * EPS * up, up < 8 * EPS * down  # π/2 − |β| is twice the ratio

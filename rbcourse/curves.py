@@ -23,7 +23,8 @@ from rbcourse._checks import (
 from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, cross
 from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
-from rbcourse.so3 import hat, log_so3
+from rbcourse._valid import as_rotations
+from rbcourse.so3 import hat, log
 
 BLOCK = 5128  # number of rotations evaluated together, as in `rbcourse._foam`
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
@@ -60,7 +61,7 @@ class Ends(_Ends):
 
     def __new__(cls, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Self:
         """Check the arguments, and broadcast them to a common batch shape."""
-        R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+        R0, R1 = as_rotations("R0", R0), as_rotations("R1", R1)
         w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
         batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
         return cls._make((R0, R1, w0, w1)).broadcast_to(batch)
@@ -442,10 +443,10 @@ def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
 
 def geodesic_data(R0: ArrayLike, R1: ArrayLike, duration: ArrayLike) -> dict[str, Array]:
     """Return the attributes of the `AlongGeodesic` that `geodesic_so3` returns."""
-    R0, R1 = as_finite("R0", R0, 3, 3), as_finite("R1", R1, 3, 3)
+    R0, R1 = as_rotations("R0", R0), as_rotations("R1", R1)
     T = as_duration("duration", duration)
     batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), duration=(T, 0))
-    turn = np.broadcast_to(log_so3(np.swapaxes(R0, -1, -2) @ R1), (*batch, 3))
+    turn = np.broadcast_to(log(np.swapaxes(R0, -1, -2) @ R1), (*batch, 3))
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
     K = hat(turn / np.where(angle == 0, 1.0, angle))
     swept = R0 @ K

@@ -19,7 +19,7 @@ from rbcourse.curves import Curve, Ends
 from rbcourse.optimum.chebyshev import grid, tails
 from rbcourse.optimum.second_variation import on_each_axis, polynomials, products
 from rbcourse.paths import smooth_parts
-from rbcourse.so3 import hat, log_so3
+from rbcourse.so3 import hat, log
 
 _NODES, _BUMPS = 33, 12
 _TOGETHER = 64  # number of curves whose linear systems fit into the cache
@@ -68,7 +68,7 @@ def leading_excess(name: str, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: A
     if not isinstance(name, str) or name not in forms:
         raise ValueError(f"name: one of {', '.join(forms)} is wanted, got {name!r}")
     ends = Ends(R0, R1, w0, w1)
-    sigma = log_so3(ends.turn)
+    sigma = log(ends.turn)
     e, d = seen_from_the_middle(sigma, ends.w0, ends.w1)
     pairs = (sigma, sigma), (e, e), (d, d), (sigma, e), (sigma, d), (e, d)
     inner = np.stack([np.sum(a * b, axis=-1) for a, b in pairs], axis=-1)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import os
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from typing import TypeAlias
 
 import numpy as np
@@ -26,7 +26,7 @@ __all__ = [
     "write_path",
 ]
 
-Rows = Iterator[tuple[str, list[float]]]
+Lines: TypeAlias = list[tuple[str, str]]
 File: TypeAlias = str | os.PathLike[str]
 TIME = ["time [s]"]
 POSITION = ["x [m]", "y [m]", "z [m]"]
@@ -48,6 +48,7 @@ VELOCITIES = {
 """The columns of a planar plan before the duration, for each frame."""
 DURATION = "duration [s]"
 _TOLERANCE = 1e-3  # of quaternion norms; some programs write only four decimals
+_PLAIN = re.compile(r"[-+.,eE\d \t\n]*", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -126,8 +127,9 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     Raises
     ------
     ValueError
-        If the file has another format or no pose, if times do not increase, or if the norm of a
-        quaternion differs from 1 by more than 1e-3. The message names the line and the reason.
+        If the file has another format or no pose, if times do not increase, if the norm of a
+        quaternion differs from 1 by more than 1e-3, or if the last line has no line end, since the
+        file may be cut there. The message names the line and the reason.
 
     Examples
     --------
@@ -140,19 +142,24 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     >>> times, poses.shape, velocities
     (array([0., 2.]), (2, 4, 4), None)
     """
-    moves, rows = _tum_rows(file) if _is_tum(file) else _csv_rows(file)
-    at, table, last = (4 if moves else 1), [], -math.inf
-    for place, row in rows:
-        if row[0] <= last:
-            raise ValueError(f"{place}: a time after {last} is wanted, got {row[0]}")
-        norm = math.hypot(*row[at : at + 4])
-        if abs(norm - 1) > _TOLERANCE:
-            raise ValueError(f"{place}: a quaternion of norm 1 is wanted, got one of {norm:.6g}")
-        table.append(row)
-        last = row[0]
-    if not table:
+    tum = _is_tum(file)
+    moves, names, lines = _tum_lines(file) if tum else _csv_table(file)
+    if not lines:
         raise ValueError(f"{file}: a pose is wanted, but the file ends")
-    times, d, q, velocities = np.split(np.array(table), [1, at, at + 4], axis=1)
+    table = _numbers(names, lines, " " if tum else ",")
+    if tum:
+        table = table[:, [0, 1, 2, 3, 7, 4, 5, 6]]  # in the order of CSV
+    at = 4 if moves else 1
+    times, d, q, velocities = np.split(table, [1, at, at + 4], axis=1)
+    if (late := np.flatnonzero(times[1:] <= times[:-1])).size:
+        before, after = times[late[0] :, 0][:2]
+        raise ValueError(f"{lines[late[0] + 1][0]}: a time after {before} is wanted, got {after}")
+    norm = np.linalg.norm(q, axis=1)
+    if (wrong := np.abs(norm - 1) > _TOLERANCE).any():
+        i = np.argmax(wrong)
+        raise ValueError(
+            f"{lines[i][0]}: a quaternion of norm 1 is wanted, got one of {norm[i]:.6g}"
+        )
     R = matrix_from_quaternion(project_quaternion(q))
     poses = join(R, d) if moves else R
     return times[:, 0], poses, velocities if velocities.size else None
@@ -223,10 +230,10 @@ def _is_tum(file: File) -> bool:
     return suffix != ".csv"
 
 
-def _csv_rows(file: File) -> tuple[bool, Rows]:
-    """Return whether a CSV file has positions, and return its rows."""
-    lines = csv_lines(file)
-    place, header = next(lines, (f"{file}, line 1", []))
+def _csv_table(file: File) -> tuple[bool, list[str], Lines]:
+    """Return whether a CSV file has positions, the names of its columns, and its other lines."""
+    place, first = next(lines := text_lines(file), (f"{file}, line 1", ""))
+    header = _cells(place, first)
     kind = next((kind for kind, names in HEADERS.items() if names == header), None)
     if kind is None:
         wanted = ", ".join(HEADERS[True, True])
@@ -235,16 +242,28 @@ def _csv_rows(file: File) -> tuple[bool, Rows]:
             f"out. Got {', '.join(header)[:200]!r}. For other files use numpy.loadtxt and "
             "pose_from_components"
         )
-    return kind[0], (_row(place, header, cells) for place, cells in lines)
+    return kind[0], header, list(lines)
 
 
-def _tum_rows(file: File) -> tuple[bool, Rows]:
-    """Return True (TUM files have positions), and the rows in the order of CSV."""
-    lines = ((place, line.split()) for place, line in text_lines(file))
-    rows = (
-        _row(place, TUM, cells) for place, cells in lines if cells and not cells[0].startswith("#")
+def _tum_lines(file: File) -> tuple[bool, list[str], Lines]:
+    """Return True (TUM files have positions), the columns, and the lines that are not comments."""
+    lines = ((place, line.strip()) for place, line in text_lines(file))
+    return True, TUM, [(place, line) for place, line in lines if line and line[0] != "#"]
+
+
+def _numbers(names: list[str], lines: Lines, separator: str) -> Array:
+    """Return the numbers of lines that are not empty, shape (lines, names)."""
+    text = "\n".join(line for _, line in lines)
+    if _PLAIN.fullmatch(text):  # fast; otherwise, and after an error, find the first wrong place
+        with suppress(ValueError):
+            delimiter = None if separator == " " else separator
+            table: Array = np.loadtxt(io.StringIO(text), delimiter=delimiter, ndmin=2)
+            if table.shape == (len(lines), len(names)) and np.isfinite(table).all():
+                return table
+    cells = (
+        (place, line.split() if separator == " " else _cells(place, line)) for place, line in lines
     )
-    return True, ((place, [*row[:4], row[7], *row[4:7]]) for place, row in rows)
+    return np.array([_row(place, names, row)[1] for place, row in cells])
 
 
 def _velocities(kind: str, joints: int) -> list[str]:
@@ -272,15 +291,22 @@ def _row(place: str, names: list[str], cells: list[str]) -> tuple[str, list[floa
 def csv_lines(file: File) -> Iterator[tuple[str, list[str]]]:
     """Yield the place and the cells of each line of a CSV file."""
     for place, line in text_lines(file):
-        try:
-            row = next(csv.reader([line], strict=True), [])
-        except csv.Error as error:
-            raise ValueError(f"{place}: {error}") from error
-        yield place, [cell.strip(" \t") for cell in row]
+        yield place, _cells(place, line)
+
+
+def _cells(place: str, line: str) -> list[str]:
+    try:
+        row = next(csv.reader([line], strict=True), [])
+    except csv.Error as error:
+        raise ValueError(f"{place}: {error}") from error
+    return [cell.strip(" \t") for cell in row]
 
 
 def text_lines(file: File) -> Iterator[tuple[str, str]]:
-    """Yield the place and the text of each line of a file; blank lines at the end are skipped."""
+    """Yield the place and the text of each line of a file; blank lines at the end are skipped.
+
+    A last line without a line end raises ValueError, because the file may have been cut there.
+    """
     with open(file, "rb") as stream:
         content = stream.read()
     try:
@@ -288,6 +314,12 @@ def text_lines(file: File) -> Iterator[tuple[str, str]]:
     except UnicodeDecodeError as error:
         line = len(re.split(rb"\r\n|\n|\r", content[: error.start]))
         raise ValueError(f"{file}, line {line}: the text is not in UTF-8") from error
+    if text and text.rstrip(" \t")[-1:] not in ("\n", "\r"):
+        line = len(re.split("\r\n|\n|\r", text))
+        raise ValueError(
+            f"{file}, line {line}: the line has no line end, so the file may be cut; if it is "
+            "complete, add a line end"
+        )
     lines = re.split("\r\n|\n|\r", text.rstrip(" \t\r\n"))
     yield from ((f"{file}, line {number}", line) for number, line in enumerate(lines, start=1))
 

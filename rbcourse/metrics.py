@@ -18,6 +18,7 @@ from rbcourse._checks import (
     first_index,
 )
 from rbcourse._numerics import EPS, Array, matvec, scaled
+from rbcourse._valid import as_rotations_or_poses
 from rbcourse.se3 import hat_se3
 from rbcourse.so3 import hat_so3, vee
 
@@ -158,7 +159,7 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     >>> float(inner_left_invariant(np.diag([1, 2, 3]), np.eye(3), X, X))
     27.0
     """
-    A, size = as_rotation_or_pose("A", A)
+    A, size = as_rotations_or_poses("A", A)
     G = as_symmetric("G", G, size)
     X, Y = as_finite("X", X, *A.shape[-2:]), as_finite("Y", Y, *A.shape[-2:])
     check_broadcast(G=(G, 2), A=(A, 2), X=(X, 2), Y=(Y, 2))
@@ -213,7 +214,7 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     >>> tangent_from_components(A, [0, 0, 0, 1, 0, 0])[:3, 3] + 0.0  # the body's x axis
     array([0., 1., 0.])
     """
-    A, size = as_rotation_or_pose("A", A)
+    A, size = as_rotations_or_poses("A", A)
     x = as_finite("x", x, size)
     check_broadcast(A=(A, 2), x=(x, 1))
     return A @ (hat_so3(x) if size == 3 else hat_se3(x))
@@ -241,7 +242,7 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     >>> components_from_tangent(R, tangent_from_components(R, [1, 2, 3]))
     array([1., 2., 3.])
     """
-    A, _ = as_rotation_or_pose("A", A)
+    A, _ = as_rotations_or_poses("A", A)
     X = as_finite("X", X, *A.shape[-2:])
     check_broadcast(A=(A, 2), X=(X, 2))
     return _components(A, X)
@@ -342,14 +343,6 @@ def weight_of(name: str, G: Array) -> Array:
             f"{largest:.6g}; each must be at most the sum of the other two"
         )
     return _trace_times_identity(G / 2) - G
-
-
-def as_rotation_or_pose(name: str, value: ArrayLike) -> tuple[Array, int]:
-    """Return the matrices, and the dimension of their group, which is SO(3) or SE(3)."""
-    A = as_finite(name, value, "n", "n")
-    if A.shape[-1] not in (3, 4):
-        raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) is wanted, got {A.shape}")
-    return A, 3 if A.shape[-1] == 3 else 6
 
 
 def _components(A: Array, X: Array) -> Array:

@@ -19,6 +19,7 @@ from rbcourse._checks import (
 )
 from rbcourse._hermite import hermite_stack, stack_terms
 from rbcourse._numerics import EPS, Array, matvec
+from rbcourse._valid import as_poses
 from rbcourse.curves import Curve, Ends, geodesic_so3, with_inertia
 from rbcourse.optimum import solve
 from rbcourse.optimum.search import ball, body
@@ -146,7 +147,7 @@ def geodesic_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> 
     array([[ 0.707, -0.707,  0.   ,  1.   ],
            [ 0.707,  0.707,  0.   ,  2.   ]])
     """
-    A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
+    A0, A1 = as_poses("A0", A0), as_poses("A1", A1)
     check_broadcast(A0=(A0, 2), A1=(A1, 2))
     (R0, d0), (R1, d1) = split(A0), split(A1)
     return rigid_motion(RigidMotion, geodesic_so3(R0, R1, duration=duration), d0, d1)
@@ -282,7 +283,7 @@ def screw_se3(A0: ArrayLike, A1: ArrayLike, *, duration: ArrayLike = 1.0) -> Scr
     >>> screw_se3(np.eye(4), A1)(0.5)[:3, 3].round(12)
     array([ 1., -1.,  1.])
     """
-    A0, A1 = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
+    A0, A1 = as_poses("A0", A0), as_poses("A1", A1)
     T = as_duration("duration", duration)
     batch = check_broadcast(A0=(A0, 2), A1=(A1, 2), duration=(T, 0))
     start, S = join(*split(A0)), log_se3(inverse_se3(A0) @ A1)
@@ -399,7 +400,7 @@ class Screw(NamedTuple):
 def _cubic_ends(
     A0: ArrayLike, A1: ArrayLike, w0: ArrayLike, w1: ArrayLike, d0_dot: ArrayLike, d1_dot: ArrayLike
 ) -> tuple[Ends, tuple[Array, ...]]:
-    poses = as_finite("A0", A0, 4, 4), as_finite("A1", A1, 4, 4)
+    poses = as_poses("A0", A0), as_poses("A1", A1)
     w = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
     v = as_finite("d0_dot", d0_dot, 3), as_finite("d1_dot", d1_dot, 3)
     batch = check_broadcast(

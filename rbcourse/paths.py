@@ -18,8 +18,8 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_finite
 from rbcourse._numerics import EPS, Array, blocks, matvec
+from rbcourse._valid import as_poses, as_rotations
 from rbcourse.closed_forms import quaternion_cubic_so3
 from rbcourse.curves import BLOCK, Curve, SingularTime
 from rbcourse.motions import RigidMotion, projected_cubic_se3, rigid_motion
@@ -189,7 +189,7 @@ def projected_spline_so3(
     (array([[0., 0., 0.]]), array([[0., 0., 0.],
            [0., 0., 0.]]))
     """
-    rotations = as_finite("rotations", rotations, "N", 3, 3)
+    rotations = as_rotations("rotations", rotations)
     w = spline_velocities(times, rotations, ends, inertia)
     leg = projected_cubic_so3 if inertia is None else partial(weighted_cubic_so3, inertia=inertia)
     return chain(times, rotations, w, leg=leg)
@@ -219,7 +219,7 @@ def projected_spline_se3(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "n
     >>> c(2)[:3, 3].round(12), c.jumps(2).round(12) + 0.0
     (array([2., 0., 0.]), array([[0., 0., 0., 0., 0., 0.]]))
     """
-    poses = as_finite("poses", poses, "N", 4, 4)
+    poses = as_poses("poses", poses)
     return chain(times, poses, spline_velocities(times, poses, ends))
 
 
@@ -252,8 +252,7 @@ def quaternion_spline_so3(
     >>> c.jumps(2).round(12) + 0.0
     array([[0., 0., 0.]])
     """
-    rotations = as_finite("rotations", rotations, "N", 3, 3)
-    times, rotations, _ = checked_path(times, rotations)
+    times, rotations, _ = checked_path(times, as_rotations("rotations", rotations))
     w = quaternion_system(np.diff(times), rotations).solve(as_ends(ends, len(rotations), 3))
     return chain(times, rotations, w, leg=quaternion_cubic_so3)
 

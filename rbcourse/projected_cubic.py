@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
-from rbcourse._numerics import Array, cross
+from rbcourse._numerics import Array, blocks, cross
 from rbcourse.curves import (
+    BLOCK,
     Curve,
     Ends,
     check_defined,
@@ -78,19 +79,29 @@ class ProjectedPolynomial(Curve):
 
     def may_jump(self) -> bool:
         """Return whether the margin may be 0, judged from 9 or, if in doubt, 65 sample times."""
-        may = np.ones(self.count, bool)
-        ends = np.moveaxis(self.take(np.arange(self.count)).ends, 1, 0)
-        for count in (9, 65):
-            times = np.linspace(0, 1, count)[:, None, None, None]
-            M = hermite(ends[:, may], times)
+        may = np.arange(self.count)
+        for samples in (9, 65):
+            may = may[self.flat.take(may).least_margins(samples) < 0]
+        return bool(len(may))
+
+    def least_margins(self, samples: int) -> Array:
+        """Return estimates of the margins from below, shape (count,), from sample times."""
+        times = np.linspace(0, 1, samples)[:, None, None, None]
+        least = np.empty(self.count)
+        for part in blocks(self.count, BLOCK // samples):
+            M = hermite(np.moveaxis(self.flat.ends[part], 1, 0), times)
             change = np.linalg.norm(np.diff(M, axis=0), axis=(-2, -1)).max(axis=0)
-            may[may] = (gap(M) < change).any(axis=0)
-        return bool(may.any())
+            least[part] = (gap(M) - change).min(axis=0)
+        return least
 
     @property
     def breakpoints(self) -> Array:
-        """The `Curve.breakpoints`, refined near small margins."""
-        return near_margins(super().breakpoints, *self._least_gap)
+        """The `Curve.breakpoints`, refined near small margins; two panels if turns are small."""
+        least = self.least_margins(9)
+        if (least > 1).all():  # the margin of a curve that stands still is 2
+            return np.array([0.0, 0.5, 1.0])
+        doubtful = self.flat.take(np.flatnonzero(least < 0.25))
+        return near_margins(super().breakpoints, *doubtful._least_gap)
 
 
 def projected_cubic_so3(

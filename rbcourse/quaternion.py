@@ -17,6 +17,7 @@ from rbcourse._checks import (
 from rbcourse._numerics import EPS, Array
 from rbcourse._taylor import multiply
 from rbcourse._taylor import slerp as slerp_jet
+from rbcourse._valid import as_unit_quaternions
 
 __all__ = [
     "canonical_quaternion",
@@ -112,7 +113,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions. A quaternion of another norm n scales the points by n².
+        Unit quaternions.
     p : array_like, shape (..., 3)
 
     Returns
@@ -124,7 +125,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     >>> rotate_by_quaternion([0, 0, 0, 1], [1, 2, 3])  # a half-turn about z
     array([-1., -2.,  3.])
     """
-    q, p = as_finite("q", q, 4), as_finite("p", p, 3)
+    q, p = as_unit_quaternions("q", q), as_finite("p", p, 3)
     check_broadcast(q=(q, 1), p=(p, 1))
     pure = np.concatenate([np.zeros((*p.shape[:-1], 1)), p], axis=-1)
     return quaternion_multiply(quaternion_multiply(q, pure), quaternion_conjugate(q))[..., 1:]
@@ -239,7 +240,7 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
            [0.866, 0.   , 0.   , 0.5  ],
            [0.   , 0.   , 0.   , 1.   ]])
     """
-    q0, q1 = as_finite("q0", q0, 4), as_finite("q1", q1, 4)
+    q0, q1 = as_unit_quaternions("q0", q0), as_unit_quaternions("q1", q1)
     batch = check_broadcast(q0=(q0, 1), q1=(q1, 1))
     u = as_time(t, len(batch))
     nearer = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < -4 * EPS, -q1, q1)
@@ -276,7 +277,7 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
            [ 0.   ,  0.   ,  0.   , -1.   ],
            [-0.707,  0.   ,  0.   , -0.707]])
     """
-    q0, q1 = as_finite("q0", q0, 4), as_finite("q1", q1, 4)
+    q0, q1 = as_unit_quaternions("q0", q0), as_unit_quaternions("q1", q1)
     u = as_time(t, len(check_broadcast(q0=(q0, 1), q1=(q1, 1))) + 1)
     back = np.where(np.sum(q0 * q1, axis=-1, keepdims=True) < -4 * EPS, -q1, q1) - q0
     size = _norm(back)

@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import Rng, as_angle, as_finite, as_generator, as_size, as_within_unit
+from rbcourse._checks import Rng, as_angle, as_generator, as_size, as_within_unit
 from rbcourse._numerics import Array, at_cache_line, blocks, sine_gap_ratio
+from rbcourse._valid import as_rotations
 from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
 
 __all__ = [
@@ -325,7 +326,7 @@ def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
     >>> round(test.statistic, 2), test.null, test.p_value < 1e-6
     (0.87, 'normal, mean 1, sd 0.014', True)
     """
-    R = as_finite("R", R, 3, 3)
+    R = as_rotations("R", R)
     if R.ndim != 3 or len(R) < 100:
         raise ValueError(f"R: shape (n, 3, 3) with n >= 100 is wanted, got {R.shape}")
     back, pairs = np.swapaxes(R, -1, -2), len(R) // 2

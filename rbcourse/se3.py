@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_single, check_broadcast
 from rbcourse._numerics import Array, matvec
-from rbcourse.projection import is_se, is_so
+from rbcourse._valid import as_poses, as_rotations, as_rotations_or_poses
 from rbcourse.so3 import (
     exp_so3,
     hat_so3,
-    log_so3,
+    log,
     right_jacobian_inverse_so3,
     right_jacobian_so3,
     vee_so3,
@@ -44,7 +44,7 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
            [0., 0., 1., 3.],
            [0., 0., 0., 1.]])
     """
-    R, d = as_finite("R", R, 3, 3), as_finite("d", d, 3)
+    R, d = as_rotations("R", R), as_finite("d", d, 3)
     check_broadcast(R=(R, 2), d=(d, 1))
     return join(R, d)
 
@@ -69,7 +69,7 @@ def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
     >>> d
     array([5., 6., 7.])
     """
-    return split(as_finite("A", A, 4, 4))
+    return split(as_poses("A", A))
 
 
 def split(A: Array) -> tuple[Array, Array]:
@@ -103,9 +103,9 @@ def inverse_se3(A: ArrayLike) -> Array:
     >>> bool(np.allclose(inverse_se3(A) @ A, np.eye(4)))
     True
     """
-    R, d = split(as_finite("A", A, 4, 4))
+    R, d = split(as_poses("A", A))
     Rt = np.swapaxes(R, -1, -2)
-    return pose_from_components(Rt, -matvec(Rt, d))
+    return join(Rt, -matvec(Rt, d))
 
 
 def pose_from_coordinates(x: ArrayLike) -> Array:
@@ -130,7 +130,7 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
            [ 0.,  0.,  1.,  3.]])
     """
     x = as_finite("x", x, 6)
-    return pose_from_components(exp_so3(x[..., :3]), x[..., 3:])
+    return join(exp_so3(x[..., :3]), x[..., 3:])
 
 
 def coordinates_from_pose(A: ArrayLike) -> Array:
@@ -152,8 +152,8 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     >>> coordinates_from_pose(pose_from_coordinates([0.1, 0, 0.3, 1, 2, 3])).round(12)
     array([0.1, 0. , 0.3, 1. , 2. , 3. ])
     """
-    R, d = split(as_finite("A", A, 4, 4))
-    return np.concatenate([log_so3(R), d], axis=-1)
+    R, d = split(as_poses("A", A))
+    return np.concatenate([log(R), d], axis=-1)
 
 
 def hat_se3(S: ArrayLike) -> Array:
@@ -238,7 +238,7 @@ def exp_se3(S: ArrayLike) -> Array:
     S = as_finite("S", S, 6)
     w, v = S[..., :3], S[..., 3:]
     left_jacobian = np.swapaxes(right_jacobian_so3(w), -1, -2)
-    return pose_from_components(exp_so3(w), matvec(left_jacobian, v))
+    return join(exp_so3(w), matvec(left_jacobian, v))
 
 
 def log_se3(A: ArrayLike) -> Array:
@@ -261,8 +261,8 @@ def log_se3(A: ArrayLike) -> Array:
     >>> log_se3(exp_se3([0, 0, 1.5, 1, 2, 3])).round(12)
     array([0. , 0. , 1.5, 1. , 2. , 3. ])
     """
-    R, d = split(as_finite("A", A, 4, 4))
-    w = log_so3(R)
+    R, d = split(as_poses("A", A))
+    w = log(R)
     left_jacobian_inverse = np.swapaxes(right_jacobian_inverse_so3(w), -1, -2)
     return np.concatenate([w, matvec(left_jacobian_inverse, d)], axis=-1)
 
@@ -287,7 +287,7 @@ def adjoint_se3(A: ArrayLike) -> Array:
     >>> adjoint_se3(A) @ [0, 0, 1, 0, 0, 0]  # a turn about an axis 2 m away moves the origin
     array([0., 0., 1., 2., 0., 0.])
     """
-    R, d = split(as_finite("A", A, 4, 4))
+    R, d = split(as_poses("A", A))
     Ad = np.zeros((*R.shape[:-2], 6, 6))
     Ad[..., :3, :3] = Ad[..., 3:, 3:] = R
     Ad[..., 3:, :3] = hat_so3(d) @ R
@@ -304,9 +304,10 @@ def check_path(
     """
     if np.size(times) == 0:
         raise ValueError("times, poses: one or more are wanted, got none")
-    times, poses = as_single("times", times, "N"), as_finite("poses", poses, "n", "n")
+    times = as_single("times", times, "N")
+    poses, _ = as_rotations_or_poses("poses", poses)
     size = poses.shape[-1]
-    if poses.ndim != 3 or size not in (3, 4):
+    if poses.ndim != 3:
         raise ValueError(f"poses: shape (N, 4, 4) or (N, 3, 3) is wanted, got {poses.shape}")
     if len(times) != len(poses):
         raise ValueError(
@@ -316,10 +317,6 @@ def check_path(
     if len(late):
         before, after = times[late[0] :][:2]
         raise ValueError(f"times[{late[0] + 1}] is {after}, a time after {before} is wanted")
-    passes = is_so(poses) if size == 3 else is_se(poses)
-    if not passes.all():
-        what, cure = ("rotation", "project_so") if size == 3 else ("pose", "project_se")
-        raise ValueError(f"poses[{np.argmin(passes)}] is not a {what} ({cure} gives the nearest)")
     if velocities is not None:
         velocities = as_single("velocities", velocities, "N", 3 if size == 3 else 6)
         if len(velocities) != len(times):

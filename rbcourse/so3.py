@@ -7,11 +7,8 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._numerics import Array, sinc
-from rbcourse.conversions import (
-    axis_and_angle,
-    quaternion_from_matrix,
-    rotation_vector_from_quaternion,
-)
+from rbcourse._valid import as_rotations
+from rbcourse.conversions import axis_and_angle, quaternion_of, rotation_vector_of
 
 BASIS_SO3 = np.array(
     [
@@ -125,7 +122,12 @@ def log_so3(R: ArrayLike) -> Array:
     >>> log_so3([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     array([0.        , 0.        , 1.57079633])
     """
-    return rotation_vector_from_quaternion(quaternion_from_matrix(R))
+    return log(as_rotations("R", R))
+
+
+def log(R: Array) -> Array:
+    """Compute `log_so3` without checks."""
+    return rotation_vector_of(quaternion_of(R))
 
 
 def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
@@ -147,9 +149,9 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     >>> float(angle_between(np.eye(3), exp_so3([0, 0.3, 0.4])).round(12))
     0.5
     """
-    R, S = as_finite("R", R, 3, 3), as_finite("S", S, 3, 3)
+    R, S = as_rotations("R", R), as_rotations("S", S)
     check_broadcast(R=(R, 2), S=(S, 2))
-    return np.linalg.norm(log_so3(np.swapaxes(R, -1, -2) @ S), axis=-1)
+    return np.linalg.norm(log(np.swapaxes(R, -1, -2) @ S), axis=-1)
 
 
 def right_jacobian_so3(w: ArrayLike) -> Array:

@@ -423,7 +423,7 @@ class _Grid:
         h = path.legs.duration[self.leg]
         self.s = path.knots[self.leg] + self.share[0] * h
         self.h = np.diff(self.share, axis=0)[0] * h
-        start, end = path.rest[:, self.leg].any(axis=-1)
+        start, end = path.rest[0, self.leg].any(axis=-1), path.rest[1, self.leg].any(axis=-1)
         self.near = (start & (share[1] <= 0.04)) | (end & (share[0] >= 0.96))
         self.begins = self.first & ~np.isnan(path.x[0, self.leg])  # the first cells of pieces
         self.ends = self.last & ~np.isnan(path.x[1, self.leg])

@@ -30,10 +30,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_inertia, as_single
 from rbcourse._numerics import Array, matvec
-from rbcourse.conversions import quaternion_from_matrix
+from rbcourse.conversions import quaternion_of
 from rbcourse.metrics import weight_of
 from rbcourse.se3 import check_path
-from rbcourse.so3 import hat, log_so3, right_jacobian_so3, vee
+from rbcourse.so3 import hat, log, right_jacobian_so3, vee
 
 PathEnds = str | tuple[ArrayLike | None, ArrayLike | None]
 """The end conditions of a path: "natural", "periodic", or a pair of velocities."""
@@ -193,7 +193,7 @@ def path_system(h: Array, R: Array, d: Array) -> KnotSystem:
 
 def quaternion_system(h: Array, R: Array, long: NDArray[np.bool_] | bool = False) -> KnotSystem:
     """Return the system for unit quaternions; legs for which `long` is True turn the long way."""
-    q = np.where(long, -1, 1)[..., None] * quaternion_from_matrix(R[:-1].mT @ R[1:])
+    q = np.where(long, -1, 1)[..., None] * quaternion_of(R[:-1].mT @ R[1:])
     B = q[:, :1, None] * np.eye(3) + hat(q[:, 1:])
     return _cubic_system(h, np.eye(3), B, 2 * q[:, 1:], 2 * q[:, 1:])
 
@@ -272,7 +272,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     """
     times, poses, _ = checked_path(times, poses)
     h, R, d = np.diff(times)[:, None], poses[:, :3, :3], poses[:, :3, 3:]
-    turns = log_so3(R[:-1].mT @ R[1:])
+    turns = log(R[:-1].mT @ R[1:])
     w = _slopes_of_parabolas(h, turns / h)
     for end, turn in ((0, -turns[0]), (-1, turns[-1])):
         w[end] = right_jacobian_so3(turn) @ w[end]  # convert from coordinates about the neighbour

@@ -157,7 +157,7 @@ REFUSED = {
         ("a.csv", ([1, 0], POSES[:2]), r"times\[1\] is 0.0, a time after 1.0 is wanted"),
         ("a.csv", ([0], POSES[:2]), "times, poses: equal numbers are wanted, got 1 and 2"),
         ("a.csv", ([], POSES[:0]), "times, poses: one or more are wanted, got n"),
-        ("a.csv", (TWO, 2 * POSES[:2]), r"poses\[0\] is not a pose \(project_se gives"),
+        ("a.csv", (TWO, 2 * POSES[:2]), r"poses\[0\] is not a pose: its last row is"),
         ("a.csv", (TWO, POSES[:2, :2]), "poses: shape"),
         ("a.csv", (TWO, POSES[:2], MOVES[:, :3]), "velocities: shape"),
         ("a.csv", (TWO, POSES[:2], MOVES * np.nan), r"velocities\[0, 0\] is nan"),
@@ -184,6 +184,25 @@ def test_bad_arguments_change_no_file(tmp_path, function):
                 function(file, *arguments)
             assert file.exists() == ("there" in file.name)
             assert not file.exists() or file.read_text("utf-8") == "there"
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.tum"])
+def test_a_file_that_was_cut_inside_its_last_line_is_refused(tmp_path, name):
+    """Without its last characters, a number such as 4.1e-18 would be read as 4.1."""
+    file = tmp_path / name
+    rb.write_path(file, TIMES[:3], POSES[:3])
+    complete = file.read_bytes()
+    for end in (b"", b"\n", b" \t\n\n", b"\r\n"):
+        file.write_bytes(complete[:-1] + (end or b"\n"))
+        assert len(rb.read_path(file)[0]) == 3
+    for lost in range(1, 5):
+        file.write_bytes(complete[:-lost])
+        with pytest.raises(ValueError, match=r"line 4: the line has no line end, so the file may"):
+            rb.read_path(file)
+    save_plan(tmp_path / "plan.csv", [([1, 0, 0.25], 2)], "world")
+    (tmp_path / "plan.csv").write_bytes((tmp_path / "plan.csv").read_bytes()[:-1])
+    with pytest.raises(ValueError, match="line 2: the line has no line end"):
+        load_plan(tmp_path / "plan.csv", "world")
 
 
 def test_a_missing_file_is_reported(tmp_path):

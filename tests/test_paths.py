@@ -237,7 +237,7 @@ PATHS = [
     (([-1.7e308, 1.7e308], POSES[:2]), "times[0] and times[1] are inf apart"),
     (([0], POSES[:1]), "times, poses: two or more are wanted, got 1"),
     (([0, 1], POSES[0]), "poses: shape (N, 4, 4) or (N, 3, 3) is wanted, got (4, 4)"),
-    (([0, 1], [-np.eye(3)] * 2), "poses[0] is not a rotation (project_so gives"),
+    (([0, 1], [-np.eye(3)] * 2), "poses[0] is not a rotation: its determinant is −1"),
     (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
 ]
 OF_PATHS = rb.chain, rb.bessel_velocities, rb.spline_velocities

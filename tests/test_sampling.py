@@ -100,7 +100,8 @@ def test_bad_arguments_are_refused():
         bad += [(draw, {"x": [0, x, 0]}, rf"x\[1\] is {x}, a number in") for x in (1.5, -0.1)]
     for shape in [(99, 3, 3), (3, 3), (2, 100, 3, 3), (100, 4)]:
         message = r"R: shape \((n|\.\.\.), 3, 3\) .*wanted, got"
-        bad += [(uniformity_tests, {"R": np.zeros(shape)}, message)]
+        R = np.broadcast_to(np.eye(3), shape) if shape[-1] == 3 else np.zeros(shape)
+        bad += [(uniformity_tests, {"R": R}, message)]
     bad += [(angle_law, {"angle": 4}, r"angle is 4.0, an angle in \[0, π\] is wanted")]
     for function, arguments, message in bad:
         with pytest.raises(ValueError, match=f"^{message}"):
@@ -197,8 +198,8 @@ def test_the_statistics_agree_with_scipy():
     assert nulls[1:3] == ["normal, mean 1, sd 0.045", "Kolmogorov, n = 1000"]
     assert nulls[4:6] == ["χ², 19 degrees of freedom", "Kolmogorov, n = 500"]
     # 40 images of e₁ are at each pole and 40 on the date line, so three of the 20 cells are full.
-    up, down = np.eye(3)[[2, 1, 0]], np.eye(3)[[2, 1, 0]] * [[1], [1], [-1]]
+    up, down = [[0, 0, 1], [0, -1, 0], [1, 0, 0]], [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
     for sign in (0.0, -0.0):
-        date_line = [[-0.8, 0, 0.6], [sign, 1, 0], [0.6, 0, 0.8]]
+        date_line = [[-0.8, 0, 0.6], [sign, -1, 0], [0.6, 0, 0.8]]
         found = uniformity_tests([up, down, date_line] * 40)["image of e₁"]
         assert found.statistic == pytest.approx((3 * (40 - 6) ** 2 + 17 * 6**2) / 6, rel=1e-12)

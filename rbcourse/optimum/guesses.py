@@ -12,7 +12,7 @@ from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import along, chebyshev, grid
 from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
-from rbcourse.so3 import exp_so3, hat, log_so3, vee
+from rbcourse.so3 import exp_so3, hat, log, vee
 
 LONGEST = 100.0  # rad: greater lengths add no further full turns
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
@@ -36,7 +36,7 @@ def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.in
     first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
     ahead, back = exp_so3(np.stack([first, -last]))
     C1 = ends.R0 @ ahead
-    v = log_so3(C1.mT @ ends.R1 @ back)
+    v = log(C1.mT @ ends.R1 @ back)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
     # rounding must not choose between two turns by π
     other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
@@ -126,7 +126,7 @@ def _continuous_log(R: Array) -> Array:
     The length of this axis is odd. At the middle of the axis, one logarithm is the shortest, and
     the other turns the other way round.
     """
-    shortest = log_so3(R)
+    shortest = log(R)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
     axis = shortest / np.maximum(angle, 1e-150)
     v = np.stack([shortest, shortest - 2 * np.pi * axis])

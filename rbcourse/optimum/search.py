@@ -39,7 +39,7 @@ from rbcourse.optimum.guesses import (
     with_full_turns,
 )
 from rbcourse.projection import nearest
-from rbcourse.so3 import log_so3
+from rbcourse.so3 import log
 
 Numbers: TypeAlias = NDArray[np.intp]
 NOTHING = Failure(np.inf, 0)
@@ -120,7 +120,7 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
     12 (2π − 2)² > 200. No second stationary curve that turns the short way was found, but a proof
     is missing.
     """
-    largest = np.abs([log_so3(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
+    largest = np.abs([log(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
     slow = np.flatnonzero(largest < LIMITS.one_start)
     if not len(slow):
         return {}

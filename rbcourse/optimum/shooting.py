@@ -20,7 +20,7 @@ from rbcourse.optimum.collocation import (
     rates_at_nodes,
 )
 from rbcourse.optimum.search import ball
-from rbcourse.so3 import hat_so3, log_so3
+from rbcourse.so3 import hat_so3, log
 
 NODES = 96
 STEPS = 20
@@ -110,7 +110,7 @@ def _miss(equations: BallStationary, aim: Array) -> tuple[Array, Array]:
     The derivatives are accurate near the goal, where R(1) is close to R1.
     """
     R, w, sensitivity = (values[-1] for values in _shot(equations, aim, np.ones(1)))
-    turn = log_so3(equations.R1[0].T @ R)
+    turn = log(equations.R1[0].T @ R)
     return np.concatenate([turn, w - equations.ends[0, 1]]), sensitivity[:6]
 
 

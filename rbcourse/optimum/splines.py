@@ -23,8 +23,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_finite, as_inertia, as_positive, as_single
+from rbcourse._checks import as_inertia, as_positive, as_single
 from rbcourse._numerics import Array, blocks, matvec
+from rbcourse._valid import as_poses, as_rotations
 from rbcourse.closed_forms import quaternion_cubic
 from rbcourse.curves import Ends
 from rbcourse.motions import RigidMotion, rigid_motion
@@ -52,7 +53,7 @@ from rbcourse.optimum.guesses import cost_at_nodes, gauss_newton, rates_of, with
 from rbcourse.optimum.second_variation import is_positive
 from rbcourse.paths import Chain
 from rbcourse.projection import nearest
-from rbcourse.so3 import exp_so3, log_so3
+from rbcourse.so3 import exp_so3, log
 from rbcourse.velocities import (
     Conditions,
     KnotSystem,
@@ -235,7 +236,7 @@ def minimum_acceleration_spline_se3(
     """
     r = as_single("centre", centre, 3)
     as_positive("mass", mass)
-    times, poses, _ = checked_path(times, as_finite("poses", poses, "N", 4, 4))
+    times, poses, _ = checked_path(times, as_poses("poses", poses))
     R, h, conditions = poses[:, :3, :3], np.diff(times), as_ends(ends, len(poses), 6)
     w, v = conditions.given[:, :3], conditions.given[:, 3:]
     turning = _spline(times, R, conditions._replace(given=w), inertia, "acceleration", long)
@@ -415,7 +416,7 @@ class _Found(NamedTuple):
 def _spline(
     times: ArrayLike, R: ArrayLike, ends: PathEnds | Conditions, G: Any, what: str, long: ArrayLike
 ) -> OptimalChain:
-    times, R, _ = checked_path(times, as_finite("rotations", R, "N", 3, 3))
+    times, R, _ = checked_path(times, as_rotations("rotations", R))
     T, R, order = np.diff(times), nearest(R)[0], 2 if what == "jerk" else 1
     unit, way = T.mean(), np.asarray(long)
     if way.dtype != bool or way.shape not in ((), T.shape):
@@ -458,7 +459,7 @@ def _found(problem: _Problem, R: Array) -> _Found | Failure:
     found = _searched(problem, R, (None, *DESCENTS))
     if isinstance(problem.functional, Effort) and (
         isinstance(found, Failure)
-        or np.linalg.matrix_rank(log_so3(found.R[0, 0].T @ found.R).reshape(-1, 3), rtol=1e-6) < 2
+        or np.linalg.matrix_rank(log(found.R[0, 0].T @ found.R).reshape(-1, 3), rtol=1e-6) < 2
     ):
         t = grid(R.shape[1]).t[:, None]
         sides = (-1.0) ** np.arange(len(R))[:, None, None] * [0.4, 0.6, 0.8]  # rad, in mid-leg

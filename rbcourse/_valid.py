@@ -1,0 +1,108 @@
+"""One rule of validity for rotation matrices, poses and unit quaternions.
+
+A deviation of at most 1e-9 is accepted. A deviation of at most 1e-6, which numbers in single
+precision have, is removed by projection. A larger deviation raises ValueError.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._checks import as_finite, first_index
+from rbcourse._foam import write_cofactors
+from rbcourse._numerics import Array, blocks
+from rbcourse.projection import nearest
+
+ACCEPTED, REMOVED = 1e-9, 1e-6
+_BLOCK = 5128  # matrices that fit into the cache
+_LAST_ROW = np.array([0.0, 0, 0, 1])
+
+
+def as_rotations(name: str, value: ArrayLike) -> Array:
+    """Return rotation matrices, shape (..., 3, 3)."""
+    R = as_finite(name, value, 3, 3)
+    _repair(name, R, "rotation", "project_so")
+    return R
+
+
+def as_poses(name: str, value: ArrayLike) -> Array:
+    """Return poses, shape (..., 4, 4)."""
+    A = as_finite(name, value, 4, 4)
+    row = A[..., 3, :]
+    wrong = ~(np.abs(row - _LAST_ROW).max(axis=-1) <= REMOVED)
+    if wrong.any():
+        raise ValueError(
+            f"{first_index(name, wrong)} is not a pose: its last row is {row[wrong][0].tolist()}, "
+            "and [0, 0, 0, 1] is wanted"
+        )
+    row[...] = _LAST_ROW
+    _repair(name, A[..., :3, :3], "pose", "project_se")
+    return A
+
+
+def as_rotations_or_poses(name: str, value: ArrayLike) -> tuple[Array, int]:
+    """Return the matrices, and the dimension of their group: 3 for SO(3), 6 for SE(3)."""
+    A = as_finite(name, value, "n", "n")
+    if A.shape[-1] == 3:
+        return as_rotations(name, A), 3
+    if A.shape[-1] == 4:
+        return as_poses(name, A), 6
+    raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) is wanted, got {A.shape}")
+
+
+def as_unit_quaternions(name: str, value: ArrayLike) -> Array:
+    """Return quaternions of norm 1, shape (..., 4)."""
+    q = as_finite(name, value, 4)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(q, axis=-1)
+    deviation = np.abs(norm - 1)
+    wrong = deviation > REMOVED
+    if wrong.any():
+        raise ValueError(
+            f"{first_index(name, wrong)} has the norm {norm[wrong][0]:.9g}, and 1 is wanted, up to "
+            f"{REMOVED:g}; project_quaternion returns the nearest unit quaternion"
+        )
+    near = deviation > ACCEPTED
+    q[near] /= norm[near][..., None]
+    return q
+
+
+def _repair(name: str, R: Array, kind: str, cure: str) -> None:
+    """Project matrices that are nearly rotations, in place; refuse matrices that are not."""
+    accepted = _deviations(R.reshape(-1, 3, 3)) <= ACCEPTED
+    off = (~accepted).reshape(R.shape[:-2])
+    if not off.any():
+        return
+    M = R[off]
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation, det = np.abs(M.mT @ M - np.eye(3)).max(axis=(1, 2)), np.linalg.det(M)
+    wrong = ~((deviation <= REMOVED) & (det > 0))
+    if wrong.any():
+        i = np.argmax(wrong)
+        why = f"an entry of RᵀR − I is {deviation[i]:.2g}, and {REMOVED:g} is allowed"
+        if deviation[i] <= REMOVED:
+            why = "its determinant is −1, as of a left-handed frame"
+        off[off] = wrong
+        raise ValueError(
+            f"{first_index(name, off)} is not a {kind}: {why}; {cure} returns the nearest {kind}"
+        )
+    R[off] = nearest(M)[0]
+
+
+def _deviations(R: Array) -> NDArray[np.float64]:
+    """Return the largest entries of R − cof R and of det R − 1, which are 0 for rotations alone.
+
+    To first order, R − cof R is 2E − tr(E) I for a matrix Q (I + E), where Q is the nearest
+    rotation. Its diagonal vanishes only if E does.
+    """
+    found = np.empty(len(R))
+    for part in blocks(len(R), _BLOCK):
+        M = np.ascontiguousarray(R[part].transpose(1, 2, 0))
+        C = np.empty_like(M)
+        with np.errstate(over="ignore", invalid="ignore"):
+            write_cofactors(M, C)
+            det = np.einsum("jn,jn->n", M[0], C[0])
+            np.subtract(M, C, out=C)
+            found[part] = np.maximum(np.abs(C).max(axis=(0, 1)), np.abs(det - 1))
+    return found
