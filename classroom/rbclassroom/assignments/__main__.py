@@ -23,7 +23,8 @@ def main() -> None:
     task.add_argument("--due", type=datetime.fromisoformat, help='such as "2026-12-01 23:59"')
     task = tasks.add_parser("grade", help="grade the collected submissions")
     task.add_argument("sets", nargs="*", metavar="set", help="such as ps1; by default all sets")
-    task.add_argument("--require-box", action="store_true", help="grade only in a sandbox")
+    risk = "grade even if there is no sandbox: submissions can then do all that you can do"
+    task.add_argument("--without-box", action="store_true", help=risk)
     known, assignments = parser.parse_args(), Path("notebooks", "assignments")
     if isinstance(sys.stdout, io.TextIOWrapper):  # some consoles cannot print every letter
         sys.stdout.reconfigure(errors="replace")
@@ -31,7 +32,7 @@ def main() -> None:
         if known.task == "grade":  # nbgrader is imported here because the import takes a second
             from rbclassroom.assignments.grade import grade
 
-            grade(known.sets, assignments, known.require_box)
+            grade(known.sets, assignments, known.without_box)
         elif known.task == "collect":
             rows = collect(known.folder, assignments, known.due)
             for kind in LISTS:

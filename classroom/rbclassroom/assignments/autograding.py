@@ -22,7 +22,7 @@ from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from nbgrader import preprocessors as nbgrader
-from traitlets import Integer
+from traitlets import Bool, Integer
 from traitlets.config import Config
 
 from rbclassroom.assignments import locked_cells, sandbox
@@ -124,8 +124,9 @@ class RestoreCells(nbgrader.OverwriteCells):  # the base class adds the hidden t
 
 
 class BoxedExecute(BoundedClient, nbgrader.Execute):
-    """Run a notebook in a new folder, and in a sandbox if one is available."""
+    """Run a notebook in a new folder, and in a sandbox unless `boxed` is False."""
 
+    boxed = Bool(True, help="run the notebook only in the sandbox").tag(config=True)
     seconds = Integer(600, help="the time limit of a notebook in the sandbox").tag(config=True)
 
     def preprocess(self, nb: NotebookNode, resources: Any, km: Any = None) -> Any:
@@ -168,9 +169,11 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
         return nb, resources
 
     def create_kernel_manager(self) -> Any:
-        """Return a manager of a kernel in a sandbox."""
+        """Return a manager of a kernel in the sandbox; raise `Refused` if there is no sandbox."""
         manager = super().create_kernel_manager()
-        if not sandbox.missing():
+        if self.boxed:
+            if why := sandbox.missing():
+                raise Refused(f"there is no sandbox: {why}")
             sandbox.put_in_box(manager, self.folder, self.seconds)
         return manager
 

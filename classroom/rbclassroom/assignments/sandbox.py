@@ -2,7 +2,8 @@
 
 On the disk, the kernel sees only its own folder, the system's programs, the package, and this
 Python with its libraries. It has no network and few environment variables. When the kernel ends,
-its processes end, too. Outside Linux, or if bubblewrap does not work, there is no sandbox.
+its processes end, too. Outside Linux, or if bubblewrap does not work, there is no sandbox, and
+submissions run only if the lecturer asks for it (``grade --without-box``).
 """
 
 import functools
@@ -38,16 +39,21 @@ SYSTEM += ["/etc/alternatives", "/etc/fonts", "/etc/ld.so.cache", "/etc/localtim
 def missing() -> str:
     """Return "" if there is a sandbox, otherwise one line with the reason and a remedy."""
     if sys.platform != "linux":
-        return "this system has no sandbox; to have one, grade on Linux with bubblewrap"
+        return "it needs Linux, for example in a virtual machine or in WSL 2"
     if not shutil.which("bwrap"):
-        return "bubblewrap is not installed; on Debian and Ubuntu, sudo apt install bubblewrap"
+        return "bubblewrap is not installed (on Debian and Ubuntu: sudo apt install bubblewrap)"
+    if KEYCTL < 0:
+        return f"it does not know how to hide session keys on {platform.machine()}"
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))
         words = [*box(Path(folder), 60), sys.executable, "-c", "import ipykernel, rbclassroom"]
-        tried = subprocess.run(words, capture_output=True, text=True, errors="replace")
-    if tried.returncode:
-        said = (tried.stderr.strip() or f"its exit code is {tried.returncode}").splitlines()[-1]
-        return f"bubblewrap does not work here ({said}); user namespaces have to be allowed"
+        try:
+            subprocess.run(words, capture_output=True, text=True, errors="replace", check=True)
+        except subprocess.CalledProcessError as error:
+            said = (error.stderr.strip() or f"its exit code is {error.returncode}").splitlines()[-1]
+            return f"bubblewrap does not work here ({said}); user namespaces have to be allowed"
+        except OSError as error:  # setpriv or another program of util-linux is not there
+            return f"{error.filename} does not work here ({error.strerror})"
     return ""
 
 

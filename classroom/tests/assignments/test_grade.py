@@ -15,6 +15,7 @@ from traitlets.config import Config
 
 from rbclassroom.assignments import grade as grading
 from rbclassroom.assignments import sandbox
+from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.grade import grade, grade_one
 from rbclassroom.assignments.handout import read_config
@@ -108,7 +109,7 @@ def course(tmp_path_factory):
     course.submit_bytes("good one", b"2026-01-01 01:30:00 UTC", "timestamp.txt")
     for student, name, content, _ in FILES:
         course.submit_bytes(student, content, name)
-    assert grade([], course.folder) == [course.folder / "ps0-grades.csv"]
+    assert grade([], course.folder, without_box=True) == [course.folder / "ps0-grades.csv"]
     return course
 
 
@@ -210,7 +211,7 @@ def again(tmp_path_factory, course):
     write_csv(again.folder / "submitted" / "report.csv", rows)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grading, "ProcessPoolExecutor", Killed)
-        grade(["ps0"], again.folder)
+        grade(["ps0"], again.folder, without_box=True)
     return again
 
 
@@ -252,9 +253,9 @@ def test_alembic_is_found_without_an_activated_environment(monkeypatch):
 def test_unknown_sets_are_refused(tmp_path):
     write_tiny_set(tmp_path)
     with pytest.raises(ValueError, match="ps0: a submission in"):
-        grade(["ps0"], tmp_path)
+        grade(["ps0"], tmp_path, without_box=True)
     with pytest.raises(ValueError, match=r"one of the problem sets is wanted \(ps0\), got ps7"):
-        grade(["ps7"], tmp_path)
+        grade(["ps7"], tmp_path, without_box=True)
     with pytest.raises(ValueError, match="There are no submissions"):
         grade([], tmp_path)
 
@@ -265,7 +266,60 @@ def test_nbgrader_commands_use_the_same_configuration():
     assert read_config(ROOT / "notebooks" / "assignments") == wanted
 
 
-def test_grading_stops_if_the_sandbox_becomes_unavailable(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def template(tmp_path_factory):
+    return make_template(tmp_path_factory.mktemp("template"))
+
+
+@pytest.fixture(params=["no bubblewrap", "bubblewrap does not work"])
+def unboxed(request, tmp_path, monkeypatch):
+    """Change the search path so that there is no sandbox; return the expected reason."""
+    programs, path, why = tmp_path / "programs", os.environ["PATH"], r"bubblewrap is not installed "
+    programs.mkdir()
+    if request.param == "no bubblewrap":
+        for name in ("sh", "chmod", "rm"):
+            if there := shutil.which(name):
+                (programs / name).symlink_to(there)
+        path = ""
+    else:
+        (programs / "bwrap").write_text("#!/bin/sh\necho No permissions >&2\nexit 1\n")
+        (programs / "bwrap").chmod(0o755)
+        why = r"bubblewrap does not work here \(No permissions\)"
+    monkeypatch.setenv("PATH", f"{programs}{os.pathsep}{path}")
+    sandbox.missing.cache_clear()
+    yield why if sys.platform == "linux" else "it needs Linux"
+    sandbox.missing.cache_clear()
+
+
+def test_no_submission_runs_without_a_sandbox_unless_this_is_asked_for(
+    tmp_path, template, unboxed, monkeypatch, capsys
+):
+    course, proof = Class(tmp_path / "notebooks" / "assignments", template), tmp_path / "proof"
+    course.submit("ann", half=f"half = 0.5\nopen({str(proof)!r}, 'w').close()")
+    before = sorted(course.folder.rglob("*"))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["assignments", "grade", "ps0"])
+    with pytest.raises(SystemExit, match=f"^No submission was run.*no sandbox: {unboxed}"):
+        main()
+    assert sorted(course.folder.rglob("*")) == before
+    assert not proof.exists()
+    sys.argv.append("--without-box")
+    main()
+    assert proof.exists()
+    assert re.search(f"with all your rights: {unboxed}", capsys.readouterr().out)
+    row = course.rows()["ann"]
+    assert (row["boxed"], row["automatic"]) == ("no", "3")
+
+
+@pytest.mark.filterwarnings("ignore:Object of type <Submitted")  # nbgrader's own, in this process
+def test_a_submission_is_refused_if_the_sandbox_is_lost_during_grading(
+    tmp_path, template, monkeypatch
+):
+    """The commands and the formgrader of nbgrader also run submissions in this way."""
+    course, proof = Class(tmp_path / "course", template), tmp_path / "proof"
+    course.submit("ann", half=f"half = 0.5\nopen({str(proof)!r}, 'w').close()")
     monkeypatch.setattr(sandbox, "missing", lambda: "it failed")
-    with pytest.raises(Refused, match="the sandbox does not work any more: it failed"):
-        grade_one("ps0", "ann", tmp_path, boxed=True)
+    with pytest.raises(Refused, match="there is no sandbox: it failed"):
+        grade_one("ps0", "ann", course.folder, boxed=True)
+    assert not proof.exists()
+    assert not course.graded("ann").exists()

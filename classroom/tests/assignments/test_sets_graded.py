@@ -74,7 +74,7 @@ def course(tmp_path_factory):
         path = folder / "submitted" / student / name / f"{name}.ipynb"
         path.parent.mkdir(parents=True)
         nbformat.write(notebook, path)
-    grade([], folder)
+    grade([], folder, without_box=True)
     return folder
 
 

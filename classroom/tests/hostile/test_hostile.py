@@ -297,20 +297,6 @@ def test_feedback_pages_show_no_hidden_test(pages):
         assert SECRET not in page
 
 
-def test_grading_without_a_sandbox_is_announced_or_refused(tmp_path, template, monkeypatch, capsys):
-    """Without a sandbox, for instance on macOS, a submission runs with the rights of the
-    teacher."""
-    why = "bubblewrap is not installed; on Debian and Ubuntu: sudo apt install bubblewrap"
-    monkeypatch.setattr(sandbox, "missing", lambda: why)
-    course = Class(tmp_path, template)
-    course.submit("ann")
-    with pytest.raises(ValueError, match=f"There is no sandbox for submissions: {why}"):
-        grade(["ps0"], course.folder, require_box=True)
-    grade(["ps0"], course.folder)
-    assert why in capsys.readouterr().out
-    assert course.rows()["ann"]["boxed"] == "no"
-
-
 @pytest.mark.parametrize(
     ("who", "said"),
     [("bob", "bob has .* points"), ("ann", "The points of ann changed during the grading of bob")],
