@@ -4,7 +4,6 @@ No code of the lessons is run.
 """
 
 import argparse
-import http.server
 import json
 import os
 import re
@@ -12,11 +11,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import webbrowser
 from collections import defaultdict
-from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +25,9 @@ from rbclassroom.book import lessons, places, reference
 from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.lessons import write
 from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
+from rbclassroom.book.serve import serve
 from rbclassroom.course import ledger
+from rbclassroom.course.folder import require_writable
 from rbclassroom.course.notebooks import lesson_paths, living
 from rbclassroom.lecture.deck import write as write_decks
 from rbclassroom.lecture.slides import deck_of
@@ -52,7 +51,8 @@ browser keeps your answers. If you prefer Jupyter, ask your teacher for the set 
 LIVE = "_static/live"
 """The folder of the book with the files for running Python in its pages."""
 MADE = "made-by-course.txt"
-"""The file that identifies a folder as a book made by this module."""
+"""The file that identifies a folder as a book made by this module, and lists the files made."""
+HEAD = "This is the book of rbcourse. course.py made these files, and can make them again:"
 
 
 @dataclass
@@ -254,11 +254,14 @@ def write_sources(
 def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = None) -> None:
     """Make the book of a course, in a new folder or in the folder of an older book.
 
-    See `Sources` for `repository`, and `write_sources` for `pyodide`.
+    Files in the folder that this function did not make are kept. If it fails or is interrupted, the
+    older book remains. See `Sources` for `repository`, and `write_sources` for `pyodide`.
     """
+    shown, book = book, book.resolve()
+    require_writable(book.parent)
     if book.exists() and not (book / MADE).exists():
         raise ValueError(f"{book} is not a book made by this command; move it away or delete it")
-    with tempfile.TemporaryDirectory(dir=book.absolute().parent, prefix=".book-") as folder:
+    with tempfile.TemporaryDirectory(dir=book.parent, prefix=".book-") as folder:
         sources, extra, pages = (Path(folder, name) for name in ("sources", "extra", "pages"))
         print("Reading the lessons ...", flush=True)
         write_sources(root, sources, extra, repository, pyodide)
@@ -273,28 +276,52 @@ def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = N
         (pages / ".buildinfo").unlink()
         (pages / "_sources").rmdir()
         (pages / ".nojekyll").touch()  # without this file, GitHub Pages omits _static
-        (pages / MADE).write_text("This is the book of rbcourse; course.py can make it again.\n")
+        made = sorted(path.relative_to(pages) for path in pages.rglob("*") if path.is_file())
+        names = [path.as_posix() for path in made]
+        (pages / MADE).write_text("\n".join([HEAD, *names, ""]), encoding="utf-8")
+        size = sum(path.stat().st_size for path in pages.rglob("*") if path.is_file())
+        html = sum(path.suffix == ".html" for path in made)
+        kept = replace(book, pages, Path(folder, "old"))
+    if kept:
+        names = ", ".join(kept[:3]) + ", ..." * (len(kept) > 3)
+        print(f"Files in {shown} that this command did not make are kept: {names}")
+    print(f"{shown / 'index.html'}: {html} pages, {size / 1e6:.1f} MB")
+
+
+def replace(book: Path, pages: Path, old: Path) -> list[str]:
+    """Put new pages in place of a book; copy the files that `build` did not make, and return them.
+
+    The folder of the book is moved to `old`, and moved back if the new one cannot be put in its
+    place. In a book of an earlier version, which has no list of its files, all files that are not
+    among the new pages are kept.
+    """
+    record = book / MADE
+    head, *names = record.read_text("utf-8").splitlines() if record.exists() else [HEAD]
+    made = {Path(MADE), *map(Path, names)}
+    made |= {folder for path in made for folder in path.parents}
+    kept = []
+    for path in sorted(book.rglob("*")):
+        inner, link = path.relative_to(book), path.is_symlink()
+        target = pages / inner
+        if inner in made or (head != HEAD and target.exists()):
+            continue
+        if path.is_dir() and not link:
+            target.mkdir(parents=True, exist_ok=True)
+        elif os.path.lexists(target):
+            raise ValueError(f"{path} would be replaced by a page of the book; move it away")
+        elif path.is_file() or link:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(path, target, follow_symlinks=False)
+            kept.append(inner.as_posix())
+    try:
         if book.exists():
-            book.rename(Path(folder, "old"))
+            book.rename(old)
         pages.rename(book)
-    size = sum(path.stat().st_size for path in book.rglob("*") if path.is_file())
-    print(f"{book / 'index.html'}: {len(list(book.rglob('*.html')))} pages, {size / 1e6:.1f} MB")
-
-
-class _Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, *_: object) -> None:
-        """Print nothing about requests."""
-
-
-def serve(book: Path) -> None:
-    """Serve the book from this machine and show it in a browser, until Ctrl-C."""
-    handler = partial(_Quiet, directory=str(book))
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        address = f"http://127.0.0.1:{server.server_port}/"
-        print(f"The book is at {address}. Press Ctrl-C here to stop its server.", flush=True)
-        webbrowser.open(address)
-        with suppress(KeyboardInterrupt):
-            server.serve_forever()
+    except BaseException:
+        if old.exists() and not book.exists():
+            old.rename(book)
+        raise
+    return kept
 
 
 def main() -> None:
@@ -309,14 +336,14 @@ def main() -> None:
     book = Path("book")
     try:
         build(Path(), book, asked.repository, engine.fetch() if asked.live else None)
+        if asked.serve:
+            serve(book)
     except (OSError, ValueError) as error:
         sys.exit(str(error))
     except subprocess.CalledProcessError:
         sys.exit("Sphinx could not make the pages; its messages are above.")
     except KeyboardInterrupt:
         sys.exit(130)
-    if asked.serve:
-        serve(book)
 
 
 if __name__ == "__main__":

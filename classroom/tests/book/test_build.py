@@ -113,6 +113,102 @@ def test_a_folder_that_is_not_a_book_is_not_changed(tmp_path):
     assert (tmp_path / "mine.txt").read_text() == "mine"
 
 
+def book_of(folder, **files):
+    """Write a book as the command does: its files, and their list."""
+    for name, text in files.items():
+        path = folder / name.replace("__", "/").replace("_html", ".html")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    names = [path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()]
+    (folder / build.MADE).write_text("\n".join([build.HEAD, *names, ""]))
+    return folder
+
+
+def files_of(folder):
+    paths = [path for path in folder.rglob("*") if path.is_file() and path.name != build.MADE]
+    return {path.relative_to(folder).as_posix(): path.read_text() for path in paths}
+
+
+def test_files_that_the_command_did_not_make_are_kept(tmp_path):
+    book = book_of(tmp_path / "book", index_html="old", lessons__gone_html="old")
+    (book / "CNAME").write_text("rotations.example.org")
+    (book / ".git" / "refs").mkdir(parents=True)  # git needs this folder even if it is empty
+    (book / "lessons" / "mine.html").write_text("mine")
+    (book / "link").symlink_to("CNAME")
+    own = ["CNAME", "lessons/mine.html", "link"]
+    for number in range(3):
+        pages = book_of(tmp_path / "new", index_html=f"new {number}")
+        assert build.replace(book, pages, tmp_path / f"old {number}") == own
+        assert (book / ".git" / "refs").is_dir()
+        assert (book / "link").is_symlink()
+        assert files_of(book) == {
+            "index.html": f"new {number}",
+            "CNAME": "rotations.example.org",
+            "lessons/mine.html": "mine",
+            "link": "rotations.example.org",
+        }
+
+
+def test_a_book_without_a_list_keeps_all_other_files(tmp_path):
+    """Earlier versions made no list."""
+    book = book_of(tmp_path / "book", index_html="old", CNAME="rotations.example.org")
+    (book / build.MADE).write_text("This is the book of rbcourse; course.py can make it again.\n")
+    pages = book_of(tmp_path / "new", index_html="new")
+    assert build.replace(book, pages, tmp_path / "old") == ["CNAME"]
+    assert files_of(book) == {"index.html": "new", "CNAME": "rotations.example.org"}
+
+
+def test_a_file_that_has_the_name_of_a_new_page_stops_the_command(tmp_path):
+    book = book_of(tmp_path / "book", index_html="old")
+    (book / "search.html").write_text("mine")
+    before = files_of(book)
+    pages = book_of(tmp_path / "new", index_html="new", search_html="new")
+    with pytest.raises(ValueError, match=r"search\.html would be replaced by a page of the book"):
+        build.replace(book, pages, tmp_path / "old")
+    assert files_of(book) == before
+
+
+@pytest.mark.parametrize("moment", [1, 2])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, PermissionError])
+def test_the_old_book_remains_if_the_new_one_cannot_be_put_there(
+    tmp_path, monkeypatch, moment, error
+):
+    book = book_of(tmp_path / "book", index_html="old")
+    (book / "CNAME").write_text("rotations.example.org")
+    before, plain, calls = files_of(book), Path.rename, []
+
+    def fails(path, target):
+        calls.append(path)
+        if len(calls) == moment:
+            raise error
+        return plain(path, target)
+
+    monkeypatch.setattr(Path, "rename", fails)
+    with pytest.raises(error):
+        build.replace(book, book_of(tmp_path / "new", index_html="new"), tmp_path / "old")
+    assert files_of(book) == before
+
+
+def test_a_build_that_fails_leaves_the_old_book(tmp_path, monkeypatch):
+    book = book_of(tmp_path / "book", index_html="old")
+    before = files_of(book)
+
+    def fails(*_):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(build, "write_sources", fails)
+    with pytest.raises(OSError, match="No space"):
+        build.build(ROOT, book)
+    assert files_of(tmp_path) == {f"book/{name}": text for name, text in before.items()}
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)  # root may write everywhere
+    with pytest.raises(ValueError, match=rf"^You cannot write to the folder .*{tmp_path.name}; "):
+        build.build(ROOT, tmp_path / "book")
+    assert [*tmp_path.iterdir()] == []
+
+
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem)
 def test_the_page_of_a_lesson_omits_only_the_run_sheet(path, source):
     stored = nbformat.read(path, as_version=4).cells
