@@ -45,10 +45,11 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
 
     The function prints a line for each submission, and writes feedback and a table for each set.
     If there is no sandbox, ValueError is raised and nothing is run or written, unless `without_box`
-    is true. Submissions then run with all rights of the lecturer. Points given by hand are kept. A submission that is refused loses its feedback and its earlier
-    automatic points. If a student's points exceed the maximum, or change while another
-    student is graded, ValueError is raised and no table is written. The file
-    ``gradebook.before-NAME.db`` is a copy of the gradebook before the run.
+    is true. Submissions then run with all rights of the lecturer. Points given by hand are kept. A
+    submission that is refused loses its feedback and its earlier automatic points. If a student's
+    points exceed the maximum, or change while another student is graded, ValueError is raised and
+    no table is written. The file ``gradebook.before-NAME.db`` is a copy of the gradebook before the
+    run.
     """
     chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
     if not chosen:

@@ -283,8 +283,8 @@ def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = N
         html = sum(path.suffix == ".html" for path in made)
         kept = replace(book, pages, Path(folder, "old"))
     if kept:
-        names = ", ".join(kept[:3]) + ", ..." * (len(kept) > 3)
-        print(f"Files in {shown} that this command did not make are kept: {names}")
+        listed = ", ".join(kept[:3]) + ", ..." * (len(kept) > 3)
+        print(f"Files in {shown} that this command did not make are kept: {listed}")
     print(f"{shown / 'index.html'}: {html} pages, {size / 1e6:.1f} MB")
 
 

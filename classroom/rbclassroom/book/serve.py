@@ -30,6 +30,11 @@ class Handler(SimpleHTTPRequestHandler):
             self.send_error(404)
             return None
 
+    def end_headers(self) -> None:
+        """Let browsers ask whether a file has changed, because the port stays the same."""
+        self.send_header("Cache-Control", "no-cache")
+        super().end_headers()
+
     def log_message(self, *_: object) -> None:
         """Print nothing about requests."""
 
@@ -42,7 +47,8 @@ def serve(book: Path) -> None:
     """Serve the book from this machine and show it in a browser, until Ctrl-C.
 
     Its port is always the same, because browsers store the answers to problem sets by port. If the
-    book is served already, it is only shown. If another program uses the port, ValueError is raised.
+    book is served already, it is only shown. If another program uses the port, ValueError is
+    raised.
     """
     folder, port = book.resolve(), port_of(book)
     address = f"http://{HOST}:{port}/"

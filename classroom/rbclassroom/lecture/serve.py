@@ -20,6 +20,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application, ErrorHandler, HTTPError, RequestHandler, StaticFileHandler
 
+from rbclassroom.course.folder import port_of
 from rbclassroom.course.notebooks import lesson_paths
 from rbclassroom.lecture.deck import mathjax, write
 from rbclassroom.lecture.slides import deck_of
@@ -48,6 +49,19 @@ class Hold(RequestHandler):
     async def get(self) -> None:
         """Wait."""
         await asyncio.Event().wait()
+
+
+class _Files(StaticFileHandler):
+    def set_extra_headers(self, path: str) -> None:
+        """Let browsers ask whether a file has changed, because the port stays the same."""
+        self.set_header("Cache-Control", "no-cache")
+
+    def validate_absolute_path(self, root: str, absolute_path: str) -> str | None:
+        """Return the path, or answer with status 404 if no file can have it, such as ``/%00``."""
+        try:
+            return super().validate_absolute_path(root, absolute_path)
+        except ValueError as error:
+            raise HTTPError(404) from error
 
 
 class Desk(RequestHandler):
@@ -88,8 +102,8 @@ async def serve(path: Path, votes: str | None, browser: bool, pdf: bool) -> None
         handlers: list[tuple[str, Any, dict[str, Any]]] = [
             ("/slides/votes", Desk, {"ballot": ballot, "url": url, "token": token}),
             ("/slides/hold", Hold, {}),
-            (r"/_static/(.*)", StaticFileHandler, {"path": mathjax().parent}),
-            (r"/(.*)", StaticFileHandler, {"path": folder}),
+            (r"/_static/(.*)", _Files, {"path": mathjax().parent}),
+            (r"/(.*)", _Files, {"path": folder}),
         ]
         application = Application(
             log_function=lambda handler: None,
@@ -98,7 +112,10 @@ async def serve(path: Path, votes: str | None, browser: bool, pdf: bool) -> None
         )
         # refuse other sites whose host names lead to this machine (DNS rebinding)
         application.add_handlers(HOST.replace(".", r"\."), handlers)
-        sockets = bind_sockets(0, HOST)
+        try:  # the speaker view stores its layout by port
+            sockets = bind_sockets(0 if pdf else port_of(path.parent), HOST)
+        except OSError:  # another lecture is shown
+            sockets = bind_sockets(0, HOST)
         HTTPServer(application).add_sockets(sockets)
         address = f"http://{HOST}:{sockets[0].getsockname()[1]}/slides/{path.stem}"
         if pdf:

@@ -4,16 +4,22 @@ import ipaddress
 import secrets
 import socket
 import string
+import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from tornado.httpserver import HTTPServer
-from tornado.web import Application, HTTPError, RequestHandler
+from tornado.web import Application, RequestHandler
 
 PORT = 8000
-MOST = 500
-"""The largest number of phones, and of connections at the same time."""
+CONNECTIONS = 200
+"""The largest number of connections at the same time; macOS allows a program 256 open files."""
+AT_ONCE, EACH_SECOND, PHONES = 60, 5, 500
+"""The numbers of phones that may join from one address: at once, later each second, and in all."""
+
+FULL = "Many phones join at this moment. This page tries again by itself."
 
 
 class Ballot:
@@ -21,8 +27,7 @@ class Ballot:
 
     For the vote that was opened last, `key` is a random name, `poll` is the name of the poll, and
     `options` has the text of each letter as HTML. While `open` is true, `votes` has the letter of
-    each phone, or ``""`` before its first vote. After the vote, `counts` has the number of votes
-    for each letter.
+    each phone that has voted. After the vote, `counts` has the number of votes for each letter.
     """
 
     def __init__(self) -> None:
@@ -41,27 +46,57 @@ class Ballot:
     def close(self) -> None:
         """Close and count the vote if it is open, and delete the votes of individual phones."""
         if self.open:
-            self.counts = Counter(filter(None, self.votes.values()))
+            self.counts = Counter(self.votes.values())
             self.votes, self.open = {}, False
 
     def state(self) -> dict[str, Any]:
         """Return the poll, whether its vote is open, the number of votes, and the final counts."""
         counts = [] if self.open else [self.counts[letter] for letter in self.options]
-        voters = sum(map(bool, self.votes.values())) if self.open else sum(counts)
+        voters = len(self.votes) if self.open else sum(counts)
         return {"poll": self.poll, "open": self.open, "voters": voters, "counts": counts}
+
+
+class Guests:
+    """The phones that have joined a lecture: `phones` has their random names.
+
+    A program can join as many phones. It cannot be told from a class, because all phones behind a
+    router or a hotspot have the address of this router. The limits for an address therefore let a
+    class of 200 join from one address within half a minute. A single program can still add 60
+    votes at once, and 300 each minute; the lecturer sees that there are more votes than people. It
+    cannot keep out phones with other addresses or phones that have joined before. `clock` returns
+    the time in seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock = clock
+        self.phones = set[str]()
+        self._joined = Counter[str]()  # for each address, the number of phones
+        self._due = dict[str, float]()  # when its phones had joined if 5 could join each second
+
+    def join(self, address: str) -> str:
+        """Return a new name for a phone, or "" if too many phones with its address have joined."""
+        now = self.clock()
+        due = max(now, self._due.get(address, 0)) + 1 / EACH_SECOND
+        if due - now > AT_ONCE / EACH_SECOND or self._joined[address] == PHONES:
+            return ""
+        self._due[address] = due
+        self._joined[address] += 1
+        name = secrets.token_hex(16)
+        self.phones.add(name)
+        return name
 
 
 class Phone(RequestHandler):
     """The page of the phones: ``GET`` shows it, and ``POST`` with ``choice=B`` votes.
 
-    A random number in a cookie identifies a phone. Each vote has new cookies. When the vote is
-    closed, the page shows the counts. It asks for ``/state`` and reloads if this has changed.
+    A random number in a cookie identifies a phone until the lecture ends. When the vote is closed,
+    the page shows the counts. It asks for ``/state`` and reloads if this has changed.
     """
 
-    def initialize(self, ballot: Ballot) -> None:
-        """Store the ballot, and the phone's name in this vote, which is empty if it has none."""
-        self.ballot = ballot
-        self.phone = self.get_cookie(f"vote-{ballot.key}", "") or ""
+    def initialize(self, ballot: Ballot, guests: Guests) -> None:
+        """Store the ballot, the guests, and the name of the phone, which is empty at first."""
+        self.ballot, self.guests = ballot, guests
+        self.phone = self.get_cookie("phone", "") or ""
 
     def set_default_headers(self) -> None:
         """Restrict the page to content of this server; forbid browsers to store or frame it."""
@@ -76,28 +111,45 @@ class Phone(RequestHandler):
         if self.request.path == "/state":
             self.finish(ballot.key if ballot.open else "")
             return
-        if ballot.open and self.phone not in ballot.votes:
-            if len(ballot.votes) == MOST:
-                raise HTTPError(503, reason=f"{MOST} phones have already joined.")
-            self.phone = secrets.token_hex(16)
-            ballot.votes[self.phone] = ""
-            self.set_cookie(f"vote-{ballot.key}", self.phone, httponly=True, samesite="Strict")
+        if self.phone not in self.guests.phones:
+            self.phone = self.guests.join(self.request.remote_ip or "")
+            if self.phone:
+                self.set_cookie("phone", self.phone, httponly=True, samesite="Lax")
+            elif ballot.open:
+                self.set_status(503)
+                self.set_header("Refresh", "3")
+                self.finish('<meta name="viewport" content="width=device-width">' + FULL)
+                return
         self.render("phone.html", ballot=ballot, choice=ballot.votes.get(self.phone, ""))
 
     def post(self) -> None:
         """Record a vote, in place of an earlier one, unless it comes too late; show the page."""
         choice = self.get_body_argument("choice")
-        if self.phone in self.ballot.votes and choice in self.ballot.options:
+        known = self.phone in self.guests.phones
+        if known and self.ballot.open and choice in self.ballot.options:
             self.ballot.votes[self.phone] = choice
         self.redirect("/", status=303)
 
 
 class _Server(HTTPServer):
+    """A server that closes the oldest connection from the busiest address if it has too many.
+
+    A page needs a connection for some milliseconds only, so this connection asks for no page.
+    """
+
+    def initialize(self, *args: Any, **settings: Any) -> None:
+        """Begin without connections."""
+        super().initialize(*args, **settings)
+        self.streams = dict[Any, str]()  # the address of each connection, the oldest first
+
     def handle_stream(self, stream: Any, address: Any) -> None:
-        if len(self._connections) < MOST:
-            super().handle_stream(stream, address)
-        else:
-            stream.close()
+        """Serve a new connection."""
+        self.streams = {each: ip for each, ip in self.streams.items() if not each.closed()}
+        self.streams[stream] = address[0]
+        super().handle_stream(stream, address)
+        if len(self.streams) > CONNECTIONS:
+            ((busiest, _),) = Counter(self.streams.values()).most_common(1)
+            next(each for each, ip in self.streams.items() if ip == busiest).close()
 
 
 def find_address() -> str:
@@ -129,10 +181,11 @@ def open_votes(address: str) -> tuple[str, Ballot]:
     found.setblocking(False)
     ballot = Ballot()
     application = Application(
-        [("/(?:state)?", Phone, {"ballot": ballot})],
+        [("/(?:state)?", Phone, {"ballot": ballot, "guests": Guests()})],
         template_path=str(Path(__file__).with_name("static")),
         log_function=lambda handler: None,  # requests are not logged
     )
-    server = _Server(application, max_body_size=1000, body_timeout=5, idle_connection_timeout=10)
+    limits = {"max_body_size": 1000, "body_timeout": 5, "idle_connection_timeout": 10}
+    server = _Server(application, no_keep_alive=True, **limits)
     server.add_socket(found)
     return f"http://{address}:{found.getsockname()[1]}", ballot
