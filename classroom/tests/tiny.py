@@ -1,6 +1,8 @@
 """Helpers: a course with one small lesson, a command that runs a module, and a server."""
 
 import http.client
+import re
+import signal
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -11,6 +13,13 @@ import nbformat
 from nbformat.v4 import new_notebook
 
 MODULE = [sys.executable, "-m"]
+SERVE = """
+import pathlib, signal, sys, webbrowser
+from rbclassroom.book.serve import serve
+webbrowser.open = print
+signal.signal(signal.SIGINT, signal.default_int_handler)
+serve(pathlib.Path(sys.argv[1]))
+"""
 
 
 def lesson_at(folder, *cells):
@@ -31,6 +40,18 @@ def lecture(folder, *further):
         finally:
             server.terminate()
             server.stdout.read()
+
+
+@contextmanager
+def served(book):
+    """Serve a book; yield its address. End the server as Ctrl-C does."""
+    words = [sys.executable, "-c", SERVE, str(book)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            yield re.search(r"http://127\.0\.0\.1:\d+/", server.stdout.readline())[0]
+        finally:
+            server.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGINT)
+        assert server.wait() == 0 or sys.platform == "win32"
 
 
 def ask(address, method="GET", body=None, **headers):

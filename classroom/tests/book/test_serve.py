@@ -1,41 +1,20 @@
 """The book has the same address at each start, because browsers store answers by address."""
 
-import re
-import signal
 import socket
-import subprocess
-import sys
-from contextlib import contextmanager
 
 import pytest
-from tiny import MODULE, ask
+from tiny import ask, served
 
 from rbclassroom.book import serve as module
 from rbclassroom.course.folder import port_of
 
-CODE = "import sys; from pathlib import Path; from rbclassroom.book.serve import serve; "
-CODE += "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-CODE += "serve(Path(sys.argv[1]))"
-
 
 @pytest.fixture
-def book(tmp_path, monkeypatch):
-    monkeypatch.setenv("BROWSER", "true")  # a program that shows nothing
+def book(tmp_path):
     book = tmp_path / "Kurs ä" / "book"
     book.mkdir(parents=True)
     (book / "index.html").write_text("the book")
     return book
-
-
-@contextmanager
-def served(book):
-    """Serve a book; yield its address. End the server as Ctrl-C does."""
-    words = [*MODULE[:1], "-c", CODE, str(book)]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
-        line = server.stdout.readline()
-        yield re.search(r"http://127\.0\.0\.1:\d+/", line)[0]
-        server.send_signal(signal.SIGTERM if sys.platform == "win32" else signal.SIGINT)
-        assert server.wait() == 0 or sys.platform == "win32"
 
 
 def test_the_book_has_the_same_address_after_a_restart(book):

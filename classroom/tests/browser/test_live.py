@@ -20,6 +20,7 @@ from pages import watched
 from playwright.sync_api import expect
 from test_problems import SETS, SOURCE, TABLES, TESTS, cells, head
 from test_sets_graded import regions
+from tiny import served
 
 from rbclassroom.assignments.check import check
 from rbclassroom.assignments.collect import collect
@@ -310,6 +311,17 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
     with (tmp_path / "course" / "ps1-grades.csv").open(encoding="utf-8-sig", newline="") as table:
         (row,) = csv.DictReader(table)
     assert (row["automatic"], row["by hand"], row["remarks"]) == ("17", "tip-words-answer", "")
+
+
+def test_answers_are_there_after_the_server_was_stopped(context):
+    """A browser stores answers for an address with its port."""
+    for before, now in ("", "It turns."), ("It turns.", "It turns about z."):
+        with served(BOOK) as address, watched(context) as page:
+            page.goto(f"{address}problems/ps1.html")
+            words = page.locator(".answer-in-words textarea")
+            expect(words).to_have_value(before)
+            words.fill(now)
+            page.goto("about:blank")  # leave the page before the server ends
 
 
 def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
