@@ -13,6 +13,7 @@ from pages import watched
 from playwright.sync_api import expect
 from servers import serving
 
+from rbclassroom.lecture.deck import write
 from rbclassroom.lecture.slides import deck_of
 
 ROOT = Path(__file__).parents[3]
@@ -267,6 +268,19 @@ def test_each_printed_title_is_above_its_text(page):
     )
     assert len(pairs) > 20
     assert all(body["top"] >= title["bottom"] for title, body in pairs)
+
+
+def test_slides_say_that_they_need_javascript(context, tmp_path):
+    write({"tiny": deck_of(LESSONS[0])}, tmp_path)
+    for works in (True, False):
+        own = context.browser.new_context(java_script_enabled=works)
+        page = own.new_page()
+        page.goto((tmp_path / "tiny.html").as_uri())
+        words = page.locator("noscript h1")
+        expect(words).to_have_count(0 if works else 1)
+        if not works:
+            expect(words).to_be_visible()
+        own.close()
 
 
 def test_the_pdf_has_a_page_for_each_slide(home):
