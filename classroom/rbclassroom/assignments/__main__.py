@@ -9,6 +9,7 @@ from pathlib import Path
 from nbclient.exceptions import CellExecutionError
 
 from rbclassroom.assignments.collect import LISTS, collect
+from rbclassroom.course.folder import require_writable
 
 
 def main() -> None:
@@ -29,6 +30,7 @@ def main() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # some consoles cannot print every letter
         sys.stdout.reconfigure(errors="replace")
     try:
+        require_writable(Path())
         if known.task == "grade":  # nbgrader is imported here because the import takes a second
             from rbclassroom.assignments.grade import grade
 
@@ -48,6 +50,8 @@ def main() -> None:
                 print(make_handout(known.set, assignments, Path()))
     except (OSError, ValueError, CellExecutionError) as error:
         sys.exit(str(error))
+    except KeyboardInterrupt:
+        sys.exit(130)
 
 
 if __name__ == "__main__":

@@ -10,11 +10,12 @@ import re
 import shutil
 import signal
 import sys
-from collections.abc import Iterable, Iterator
+import tempfile
+from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import ExitStack
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -49,7 +50,8 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
     submission that is refused loses its feedback and its earlier automatic points. If a student's
     points exceed the maximum, or change while another student is graded, ValueError is raised and
     no table is written. The file ``gradebook.before-NAME.db`` is a copy of the gradebook before the
-    run.
+    run. Ctrl-C ends the submissions at work, which then count as not graded, and leaves the tables
+    of incomplete sets as they were.
     """
     chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
     if not chosen:
@@ -61,24 +63,37 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
         print(f"Submissions run without a sandbox and with all your rights: {why}.", flush=True)
     jobs, tables = [job for name in chosen for job in _prepare(name, assignments)], []
     rows: dict[Job, Row] = {}
-    for (name, student), row in _graded(jobs, assignments, not why):
-        said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
-        said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
-        print(f"{name}, {student}:", "; ".join(filter(None, [*said, row["remarks"]])), flush=True)
-        start = {"student": student, "set": name, "boxed": "no" if why else "yes"}
-        rows[name, student] = start | row
-        if row.get("late") == "" and f"{student}, {name}" in _perhaps_late(assignments):
-            rows[name, student]["late"] = "perhaps"
-        own = [job for job in jobs if job[0] == name]
-        if rows.keys() >= {*own}:
-            lines = [rows[job] for job in own]
-            for what, reason in _not_collected(name, assignments, {who for _, who in own}):
-                lines.append({"student": _tidy(what), "set": name, "remarks": _tidy(reason)})
-                print(f"{name}, {lines[-1]['student']}: {lines[-1]['remarks']}", flush=True)
-            tables.append(assignments / f"{name}-grades.csv")
-            write_csv(tables[-1], lines)
-            print(tables[-1], flush=True)
+    try:
+        with closing(_graded(jobs, assignments, not why)) as graded:
+            for (name, student), row in graded:
+                said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
+                said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
+                said += [row["remarks"]] if row["remarks"] else []
+                print(f"{name}, {student}: {'; '.join(said)}", flush=True)
+                start = {"student": student, "set": name, "boxed": "no" if why else "yes"}
+                rows[name, student] = start | row
+                own = [job for job in jobs if job[0] == name]
+                if rows.keys() >= {*own}:
+                    tables.append(_write_table(name, [rows[job] for job in own], assignments))
+    except KeyboardInterrupt:
+        count = f"{len(rows)} of {len(jobs)} submissions are graded"
+        print(f"Stopped: {count}. Tables of incomplete sets are not written; run this again.")
+        raise
     return tables
+
+
+def _write_table(name: str, rows: list[Row], assignments: Path) -> Path:
+    """Write the table of a set, with a line for each file that was not collected."""
+    for row in rows:
+        if row.get("late") == "" and f"{row['student']}, {name}" in _perhaps_late(assignments):
+            row["late"] = "perhaps"
+    for what, reason in _not_collected(name, assignments, {row["student"] for row in rows}):
+        rows.append({"student": _tidy(what), "set": name, "remarks": _tidy(reason)})
+        print(f"{name}, {rows[-1]['student']}: {rows[-1]['remarks']}", flush=True)
+    table = assignments / f"{name}-grades.csv"
+    write_csv(table, rows)
+    print(table, flush=True)
+    return table
 
 
 def _prepare(name: str, assignments: Path) -> list[Job]:
@@ -89,7 +104,8 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
         raise ValueError(f"{name}: a submission in submitted/STUDENT/{name}/ is wanted, got none")
     table = assignments / f"{name}-grades.csv"
     try:
-        table.open("a").close()
+        if table.exists():
+            table.open("a").close()
     except PermissionError as error:
         raise ValueError(f"{table} cannot be written; close it in other programs") from error
     before = Path(config.CourseDirectory.root, "gradebook.db")
@@ -102,35 +118,64 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
     return [(name, student) for student in students]
 
 
-def _graded(jobs: list[Job], assignments: Path, boxed: bool) -> Iterator[tuple[Job, Row]]:
-    """Grade submissions in parallel, one per student at a time; yield their rows."""
+@contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Ignore Ctrl-C, and let programs that start here ignore it."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _graded(
+    jobs: list[Job], assignments: Path, boxed: bool
+) -> Generator[tuple[Job, Row], None, None]:
+    """Grade submissions in parallel, one per student at a time; yield their rows.
+
+    If the caller stops early, the submissions at work are ended, and lose their earlier points and
+    their feedback, because a part of the new ones may be stored.
+    """
     course, todo = CourseDirectory(config=course_config(jobs[0][0], assignments)), list(jobs)
     works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
-    worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY,))
+    folder = Path(tempfile.mkdtemp())  # for all kernels
+    worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY, str(folder)))
     with Gradebook(course.db_url) as gradebook:
         known = _points(gradebook)
     with ExitStack() as stack:
+        stack.callback(sandbox.delete, folder)
         free = [stack.enter_context(worker()) for _ in range(WORKERS)]
-        while todo or works:
-            at_work = {student for (_, student), _ in works.values()}
-            ready = [job for job in todo if job[1] not in at_work]
-            if free and ready:
-                job, pool = ready[0], free.pop()
-                todo.remove(job)
-                works[pool.submit(grade_one, *job, assignments, boxed)] = job, pool
-                continue
-            for work in wait(works, return_when=FIRST_COMPLETED).done:
-                (name, student), pool = works.pop(work)
-                broken = isinstance(work.exception(), BrokenExecutor)
-                free.append(stack.enter_context(worker()) if broken else pool)
+        try:
+            while todo or works:
+                at_work = {student for (_, student), _ in works.values()}
+                ready = [job for job in todo if job[1] not in at_work]
+                if free and ready:
+                    job, pool = ready[0], free.pop()
+                    todo.remove(job)
+                    with _without_ctrl_c():
+                        works[pool.submit(grade_one, *job, assignments, boxed)] = job, pool
+                    continue
+                for work in wait(works, return_when=FIRST_COMPLETED).done:
+                    (name, student), pool = works.pop(work)
+                    broken = isinstance(work.exception(), BrokenExecutor)
+                    free.append(stack.enter_context(worker()) if broken else pool)
+                    with Gradebook(course.db_url) as gradebook:
+                        row = _row(gradebook, assignments, name, student, work)
+                        known, before = _points(gradebook), known
+                    if others := sorted({other for other, *_ in known ^ before} - at_work):
+                        when = f"during the grading of {' and '.join(sorted(at_work))}"
+                        where = f"The earlier points are in gradebook.before-{name}.db."
+                        raise ValueError(f"The points of {others[0]} changed {when}. {where}")
+                    yield (name, student), row
+        except (KeyboardInterrupt, GeneratorExit):
+            with _without_ctrl_c():
+                for process in active_children():
+                    process.kill()
+                stack.close()  # now no submission runs
                 with Gradebook(course.db_url) as gradebook:
-                    row = _row(gradebook, assignments, name, student, work)
-                    known, before = _points(gradebook), known
-                if others := sorted({other for other, *_ in known ^ before} - at_work):
-                    when = f"during the grading of {' and '.join(sorted(at_work))}"
-                    where = f"The earlier points are in gradebook.before-{name}.db."
-                    raise ValueError(f"The points of {others[0]} changed {when}. {where}")
-                yield (name, student), row
+                    for job, _ in works.values():
+                        _withdraw(gradebook, assignments, *job)
+            raise
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
@@ -173,7 +218,10 @@ def run_step(converter: Any, config: Config) -> dict[str, Any]:
     log.propagate, log.handlers = False, [logging.NullHandler()]
     step = converter(CourseDirectory(config=config), config=config, log=log)
     step.force = True
-    return capture_log(step)
+    done: dict[str, Any] = capture_log(step)
+    if done.get("error", "").strip().endswith("KeyboardInterrupt"):
+        raise KeyboardInterrupt
+    return done
 
 
 def last_line(done: dict[str, str]) -> str:
@@ -190,8 +238,9 @@ def _points(gradebook: Any) -> set[tuple[str, str, float]]:
     return {(each.student_id, each.assignment.name, each.score) for each in submissions}
 
 
-def _begin(memory: int) -> None:
-    """Silence this process, limit its memory, and let it end with its parent."""
+def _begin(memory: int, folder: str) -> None:
+    """Silence this process, limit its memory, choose its folder, let it end with its parent."""
+    tempfile.tempdir = folder
     parent: Any = parent_process()
     Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
     with open(os.devnull, "r+b") as nowhere:

@@ -3,11 +3,15 @@
 import os
 import re
 import shutil
+import signal
+import subprocess
 import sys
+import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import nbformat
+import psutil
 import pytest
 from tiny_class import Class, begun, make_template
 from tiny_set import cell, write_tiny_set
@@ -323,3 +327,46 @@ def test_a_submission_is_refused_if_the_sandbox_is_lost_during_grading(
         grade_one("ps0", "ann", course.folder, boxed=True)
     assert not proof.exists()
     assert not course.graded("ann").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a test cannot press Ctrl-C on Windows")
+def test_after_ctrl_c_the_submissions_at_work_count_as_not_graded(tmp_path, template):
+    """The points, feedback and table of others remain, and grading again completes them."""
+    course, places = Class(tmp_path / "notebooks" / "assignments", template), tmp_path / "places"
+    places.mkdir()
+    course.submit("ann", half="half = 3")
+    course.submit("bob")
+    grade(["ps0"], course.folder, without_box=True)
+    table = course.rows()
+    course.submit("ann")
+    course.submit("bob", half=f"{begun()}\nimport time\ntime.sleep(10**6)")
+    words = [sys.executable, "-m", "rbclassroom.assignments", "grade", "--without-box"]
+    job = subprocess.Popen(
+        words,
+        cwd=tmp_path,
+        env=os.environ | {"TMPDIR": str(places), "PYTHONPATH": os.pathsep.join(sys.path)},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    )
+    family = [psutil.Process(job.pid)]
+    assert "ps0, ann: 3 of 6 points" in job.stdout.readline()
+    while not [*places.rglob("begun-*")]:
+        assert job.poll() is None
+        time.sleep(0.1)
+    family += family[0].children(recursive=True)
+    os.killpg(job.pid, signal.SIGINT)
+    said, errors = job.communicate()
+    assert (job.returncode, errors) == (130, "")
+    assert said.startswith("Stopped: 1 of 2 submissions are graded. ")
+    assert said.count("\n") == 1
+    assert psutil.wait_procs(family, timeout=60)[1] == []
+    assert [path for path in places.iterdir() if not path.name.startswith("pymp-")] == []
+    assert course.rows() == table
+    assert "Score: 3.0 / 6.0" in course.feedback("ann")
+    assert not course.graded("bob").exists()
+    assert not (course.folder / "feedback" / "bob" / "ps0").exists()
+    with course.gradebook() as gradebook:
+        assert gradebook.find_submission("ps0", "ann").score == 3
+        assert gradebook.find_submission("ps0", "bob").score == 0
