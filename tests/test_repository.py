@@ -329,6 +329,8 @@ def test_lab_opens_the_first_lesson_without_the_extensions_for_teachers(
     assert (ROOT / address.removeprefix("/lab/tree/").replace("work", "notebooks")).is_file()
     assert "--no-browser" in opened
     configuration = Path(os.environ["JUPYTER_CONFIG_PATH"])
+    others = [path for path in (tmp_path / "share").iterdir() if path != configuration]
+    assert others == []  # in an environment of the user, these files belong to the user
     page = json.loads((configuration / "labconfig" / "page_config.json").read_text())
     assert page["disabledExtensions"]["@jupyter/nbgrader"]
     server = json.loads((configuration / "jupyter_server_config.json").read_text())

@@ -8,6 +8,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from rbclassroom.course.folder import require_writable
 from rbclassroom.course.notebooks import copy_lessons
 
 TEACHERS = ["@jupyter/nbgrader"]
@@ -32,9 +33,9 @@ def configure() -> Path:
     encrypts the messages of kernels. It inverts pictures in a dark theme, and saves explorers as
     stills.
     """
-    shared = Path(sys.prefix, "share")
-    _write(shared / "jupyter" / "lab" / "settings" / "overrides.json", OVERRIDES)
-    folder = shared / "rbcourse"
+    folder = Path(sys.prefix, "share", "rbcourse")
+    # in an environment of the user, the files in share/jupyter belong to the user
+    _write(folder / "labconfig" / "default_setting_overrides.json", OVERRIDES)
     off = {"disabledExtensions": dict.fromkeys(TEACHERS, True)}
     _write(folder / "labconfig" / "page_config.json", off)
     extensions = {f"nbgrader.server_extensions.{part}": False for part in PARTS}
@@ -67,16 +68,21 @@ def main() -> None:
     )
     parser.add_argument("--edit", action="store_true", help="edit originals, not copies in work/")
     known, words = parser.parse_known_args()
-    if known.edit:
-        os.environ["RBCOURSE_EDIT"] = "1"
-    else:
-        copy_lessons(Path("notebooks"), Path("work"))
+    try:
+        require_writable(Path())
+        if known.edit:
+            os.environ["RBCOURSE_EDIT"] = "1"
+        else:
+            copy_lessons(Path("notebooks"), Path("work"))
+        configured = configure()
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
     folder = "notebooks" if known.edit else "work"
     address = f"--LabApp.default_url=/lab/tree/{folder}/00_start_here.ipynb"
     words = [f"--ServerApp.root_dir={Path().resolve()}", "--log-level=ERROR", address, *words]
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         words.append("--allow-root")
-    paths = [str(configure()), os.environ.get("JUPYTER_CONFIG_PATH")]
+    paths = [str(configured), os.environ.get("JUPYTER_CONFIG_PATH")]
     os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
     print("JupyterLab opens in the browser. To stop it, press Ctrl-C here.", flush=True)
     # JupyterLab causes these warnings, because it reads its configuration twice

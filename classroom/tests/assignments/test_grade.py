@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
+from glob import glob
 from pathlib import Path
 
 import nbformat
@@ -339,7 +340,7 @@ def test_after_ctrl_c_the_submissions_at_work_count_as_not_graded(tmp_path, temp
     grade(["ps0"], course.folder, without_box=True)
     table = course.rows()
     course.submit("ann")
-    course.submit("bob", half=f"{begun()}\nimport time\ntime.sleep(10**6)")
+    course.submit("bob", half="open('asleep', 'w').close()\nimport time\ntime.sleep(10**6)")
     words = [sys.executable, "-m", "rbclassroom.assignments", "grade", "--without-box"]
     job = subprocess.Popen(
         words,
@@ -352,7 +353,7 @@ def test_after_ctrl_c_the_submissions_at_work_count_as_not_graded(tmp_path, temp
     )
     family = [psutil.Process(job.pid)]
     assert "ps0, ann: 3 of 6 points" in job.stdout.readline()
-    while not [*places.rglob("begun-*")]:
+    while not glob(f"{places}/*/*/work/asleep"):
         assert job.poll() is None
         time.sleep(0.1)
     family += family[0].children(recursive=True)
