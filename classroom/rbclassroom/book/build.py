@@ -296,14 +296,14 @@ def replace(book: Path, pages: Path, old: Path) -> list[str]:
     among the new pages are kept.
     """
     record = book / MADE
-    head, *names = record.read_text("utf-8").splitlines() if record.exists() else [HEAD]
-    made = {Path(MADE), *map(Path, names)}
+    lines = record.read_text("utf-8").splitlines() if record.exists() else []
+    has_list, made = lines[:1] == [HEAD], {Path(MADE), *map(Path, lines[1:])}
     made |= {folder for path in made for folder in path.parents}
     kept = []
     for path in sorted(book.rglob("*")):
         inner, link = path.relative_to(book), path.is_symlink()
         target = pages / inner
-        if inner in made or (head != HEAD and target.exists()):
+        if inner in made or (target.exists() and not has_list):
             continue
         if path.is_dir() and not link:
             target.mkdir(parents=True, exist_ok=True)

@@ -87,7 +87,7 @@ class Guests:
 
 
 class Phone(RequestHandler):
-    """The page of the phones: ``GET`` shows it, and ``POST`` with ``choice=B`` votes.
+    """The page of the phones: ``GET`` shows it, and ``POST`` with its form votes.
 
     A random number in a cookie identifies a phone until the lecture ends. When the vote is closed,
     the page shows the counts. It asks for ``/state`` and reloads if this has changed.
@@ -124,9 +124,9 @@ class Phone(RequestHandler):
 
     def post(self) -> None:
         """Record a vote, in place of an earlier one, unless it comes too late; show the page."""
-        choice = self.get_body_argument("choice")
-        known = self.phone in self.guests.phones
-        if known and self.ballot.open and choice in self.ballot.options:
+        choice, vote = self.get_body_argument("choice"), self.get_body_argument("vote", "")
+        now = self.ballot.open and vote == self.ballot.key
+        if now and self.phone in self.guests.phones and choice in self.ballot.options:
             self.ballot.votes[self.phone] = choice
         self.redirect("/", status=303)
 
