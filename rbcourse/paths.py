@@ -230,8 +230,9 @@ def quaternion_spline_so3(
 
     Among the closed forms of this package, this spline is the nearest to the optimum
     (`minimum_acceleration_spline_so3`). Its relative excess is about 0.003 θ⁴, where θ is the angle
-    of a leg in rad. Each leg turns the short way. If the rotations are moved, the spline moves with
-    them; if the times are reversed, the spline is reversed. Singular set: that of the legs.
+    of a leg in rad. A leg of duration h turns the short way if h ‖ω‖ is below 8 at both ends. If
+    the rotations are moved, the spline moves with them; if the times are reversed, the spline is
+    reversed. Singular set: that of the legs.
     Source: beyond BK 13, beyond BK 14.
 
     Parameters

@@ -434,3 +434,28 @@ def test_the_excess_of_the_quintic_grows_as_the_fourth_power():
     assert found[2] < 0.05
     rest = rb.exponential_quintic_so3(R0, R1, REST, REST, REST, REST)
     assert rb.jerk_cost(rest) == pytest.approx(1440 * np.sum(TURN**2, axis=-1), rel=1e-10)
+
+
+@pytest.mark.source("BK 1")
+def test_the_quaternion_cubic_turns_the_short_way_if_both_ends_are_below_8_rad():
+    """Its component along the quaternion half-way is at least cos(a/4) − (k/8) sin(a/4)."""
+    R0, R1, w0, w1 = ends(400)
+    speed = np.maximum(np.linalg.norm(w0, axis=1), np.linalg.norm(w1, axis=1))
+    a = rb.angle_between(R0, R1)
+    bound = np.cos(a / 4) - speed / 8 * np.sin(a / 4)
+    assert np.all(rb.quaternion_cubic_so3(R0, R1, w0, w1).margin >= bound - 8 * EPS)
+    assert bound.min() < 0.1
+    t, goal = np.linspace(0, 1, 2001), rb.exp_so3([0, 0, np.radians(170)])
+
+    def turn(k0, k1):  # about z, in degrees
+        w = rb.quaternion_cubic_so3(I3, goal, [0, 0, k0], [0, 0, k1])(t, 1)[:, 2]
+        return np.degrees(np.trapezoid(w, t))
+
+    for k0 in (-7.99, 0, 7.99):
+        for k1 in (-7.99, 3, 7.99):
+            assert turn(k0, k1) == pytest.approx(170, abs=0.5)
+    assert turn(-9, -9) == pytest.approx(170 - 720, abs=0.5)
+    turning_point = -8 / np.tan(np.radians(170 / 4))  # the cubic meets 0 at t = ½
+    for k, degrees in ((0.99 * turning_point, 170), (1.01 * turning_point, -550)):
+        assert turn(k, k) == pytest.approx(degrees, abs=2)
+    assert rb.quaternion_cubic_so3(I3, goal, *[[0, 0, turning_point]] * 2).margin < 1e-12

@@ -135,7 +135,7 @@ def test_a_free_body_follows_eulers_solution(a, c):
     assert np.abs(w - exact).max() < 1e-9
 
 
-@pytest.mark.source("BK (8)", "errata 13")
+@pytest.mark.source("BK (8)", "errata 13", "errata 26")
 def test_the_printed_geodesic_equation_is_wrong_for_the_free_body():
     """The printed equation has Γ^i_ik instead of Γ^i_jk. It also has ä, the derivative in
     coordinates, where the symbols Γ of the frame need ẇ."""

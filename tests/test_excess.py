@@ -275,14 +275,3 @@ def test_curves_on_se3_are_refused():
     ):
         with pytest.raises(ValueError, match=message):
             rb.excess_estimate(curve)
-
-
-def test_the_latex_source_has_the_formulas_of_the_note():
-    """The source is made from the note by the command in CONTRIBUTING.md."""
-    note, latex = ((ROOT / f"docs/near_optimal.{x}").read_text("utf-8") for x in ("md", "tex"))
-    here = re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", note, re.DOTALL)
-    body = latex[latex.index(r"\begin{document}") :]
-    there = re.findall(r"\\\[(.+?)\\\]|\\\((.+?)\\\)", body, re.DOTALL)
-    assert len(here) > 200
-    here, there = ([re.sub(r"\s", "", x + y) for x, y in pairs] for pairs in (here, there))
-    assert here == there

@@ -31,6 +31,38 @@ def test_the_trace_metric_is_invariant_under_rotations_only():
     assert abs(metrics.inner_gl(shear @ X, shear @ X) - metrics.inner_gl(X, X)).max() > 0.1
 
 
+@pytest.mark.source("BK 3.1", "errata 30")
+def test_the_tangent_space_of_the_matrices_is_a_vector_space_and_GL3_is_none():
+    """The sum of two velocities is a velocity; the sum of two invertible matrices need not be
+    invertible. The metric (11) is defined for singular velocities, too."""
+    X = LEFT @ rb.hat_so3(w)  # velocities of rotations; all of them are singular
+    assert np.abs(np.linalg.det(X)).max() < 1e-13 * np.linalg.norm(w, axis=1).max() ** 3
+    assert np.abs(metrics.inner_gl(X, X) - 2 * np.vecdot(w, w)).max() < 100 * EPS
+    assert np.abs(np.linalg.det(LEFT)).min() > 0.9
+    assert np.all(np.linalg.det(LEFT + -LEFT) == 0)
+
+
+@pytest.mark.source("BK 6", "BK (14)", "errata 31")
+def test_the_metric_on_poses_is_a_product_without_a_parameter():
+    """The paper asks for a = 0, and defines no a. An off-diagonal block would couple ω and v."""
+    turning, moving = S.copy(), T.copy()
+    turning[:, 3:], moving[:, :3] = 0, 0
+    X, Y = (metrics.tangent_from_components(A, x) for x in (turning, moving))
+    assert_close(metrics.inner_se3(X, Y), 0)
+    coupled = rb.METRIC_SE3 + 0.5 * np.eye(6, k=3) + 0.5 * np.eye(6, k=-3)
+    assert np.abs(metrics.inner_left_invariant(coupled, A, X, Y)).min() > 1e-3
+
+
+@pytest.mark.source("BK (5)", "errata 35")
+def test_a_field_has_its_components_in_the_moved_basis():
+    """The printed basis L_i, without its bar, belongs to the identity."""
+    X = metrics.tangent_from_components(A, S)
+    moved = np.einsum("ni,nijk->njk", S, A[:, None] @ rb.BASIS_SE3)
+    printed = np.einsum("ni,ijk->njk", S, rb.BASIS_SE3)
+    assert np.abs(X - moved).max() < 40 * EPS
+    assert np.abs(X - printed).max(axis=(1, 2)).min() > 0.1
+
+
 @pytest.mark.source("BK (12)", "BK Remark 1", "BK Remark 2", "BK 3.1", "errata 1")
 @pytest.mark.source("BK (14)", "BK Remark 3", "BK Remark 4", "BK Remark 5", "BK 3.2")
 def test_induced_trace_metrics_are_twice_the_energy_of_a_ball():

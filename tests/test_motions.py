@@ -90,11 +90,35 @@ def test_only_screws_satisfy_each_definition_of_a_screw_motion():
     A, rate = SCREWS(inside), oracles.derivative_by_differences(SCREWS, inside)
     assert np.abs(rb.vee_se3(rb.inverse_se3(A) @ rate) - SCREWS.twist).max() < 1e-11
     assert np.array_equal(SCREWS(0, 1), SCREWS.twist)
+
+
+@pytest.mark.source("BK 2.6", "errata 27")
+def test_a_screw_is_a_subgroup_only_if_it_starts_at_the_identity():
+    """The printed definition 3 has A(t) in place of A0⁻¹ A(t)."""
     a, b, ab = SCREWS([0.2, 0.5, 0.7])
-    assert np.abs(a @ b - ab).max() > 0.1  # A(t) itself is not a subgroup, unless A0 = I
+    assert np.all(np.abs(a @ b - ab).max(axis=(-2, -1)) > 0.1)
+    a, b, ab = rb.inverse_se3(A0) @ SCREWS([0.2, 0.5, 0.7])
+    assert np.abs(a @ b - ab).max() < 40 * EPS
+    a, b, ab = rb.screw_se3(np.eye(4), A1)([0.2, 0.5, 0.7])
+    assert np.abs(a @ b - ab).max() < 40 * EPS * np.abs(ab).max()
 
 
-@pytest.mark.source("errata 15")
+@pytest.mark.source("BK (1)", "BK 3.2", "errata 34")
+def test_the_twist_and_its_metric_contain_the_derivatives_of_the_pose():
+    """Without their dots, the printed Rᵀ d is a position, and the printed trace is not 0 for a body
+    at rest."""
+    t = TIMES[1:-1]
+    A, rate = SCREWS(t), oracles.derivative_by_differences(SCREWS, t)
+    R, d, d_dot = A[..., :3, :3], A[..., :3, 3:], rate[..., :3, 3:]
+    v = SCREWS(t, 1)[..., 3:, None]
+    assert np.abs(R.mT @ d_dot - v).max() < 1e-11
+    assert np.abs(R.mT @ d - v).max() > 0.1
+    squares = rb.metrics.inner_se3(rate, rate)
+    assert np.abs(np.sum(rate**2, axis=(-2, -1)) - squares).max() < 1e-10 * squares.max()
+    assert np.sum(A**2, axis=(-2, -1)).min() > 3.9  # tr(AᵀA), also for a body at rest
+
+
+@pytest.mark.source("errata 25")
 def test_the_subgroup_through_a_pose_is_not_unique():
     S = np.array([0, 0, 1.0, 0.3, -0.2, 0.5])
     screw, w = rb.screw_from_pose(rb.exp_se3(S)), S[:3]

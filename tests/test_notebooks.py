@@ -107,7 +107,8 @@ def cited_and_listed(path):
 @every_lesson
 def test_the_works_that_a_lesson_cites_are_listed_at_its_end(path):
     def plain(words):  # the words without the commands and braces of BibTeX
-        return re.sub(r"\\['v]|[{}]", "", words.replace(r"\'e", "é"))
+        words = words.replace(r"\'e", "é").replace(r"\"u", "ü")
+        return re.sub(r"\\['v]|[{}]", "", words)
 
     keys, lines = cited_and_listed(path)
     assert [re.match(r"- \[(\w+)\]", line)[1] for line in lines] == sorted(keys)

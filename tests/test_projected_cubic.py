@@ -49,7 +49,7 @@ def test_the_cubic_is_projected_to_the_nearest_rotation():
     assert np.abs(rb.vee_so3(W) - clear(t, 1)).max() < 1e-6
 
 
-@pytest.mark.source("BK 6.2", "errata 11")
+@pytest.mark.source("BK 6.2", "errata 11", "errata 23")
 def test_the_end_conditions_hold_up_to_rounding():
     """The printed second derivative at the end is wrong, and R0 ŵ0 is singular."""
     for curve in (CUBICS, QUINTICS):

@@ -153,6 +153,36 @@ def test_dependent_columns_are_refused():
             function(*arguments)
 
 
+@pytest.mark.source("errata 36")
+def test_the_two_sums_in_the_proof_of_the_projection_are_equal():
+    """Between the trace and the sum, our copy has − in place of =."""
+    M, R = np.random.default_rng(36).normal(size=(3, 3)), members(3, np.random.default_rng(2))[0]
+    U, sigma, Vt = np.linalg.svd(M)
+    C = R.T @ U
+    trace = np.trace(sum(s * np.outer(v, c) for s, v, c in zip(sigma, Vt, C.T, strict=True)))
+    inner = sum(s * (v @ c) for s, v, c in zip(sigma, Vt, C.T, strict=True))
+    assert abs(trace - np.trace(M.T @ R)) < 40 * EPS
+    assert abs(inner - np.trace(M.T @ R)) < 40 * EPS
+    printed = trace - inner
+    assert abs(printed - np.trace(M.T @ R)) > 0.5
+
+
+@pytest.mark.source("BK 2.1", "errata 28")
+def test_poses_are_a_closed_subgroup():
+    """A closed subset need not be a group: the affine maps {I, 2 x} are closed, but 4 x is not one
+    of them."""
+    rng = np.random.default_rng(28)
+    A, B = (np.tile(np.eye(4), (40, 1, 1)) for _ in range(2))
+    for poses in (A, B):
+        poses[:, :3, :3], poses[:, :3, 3] = members(3, rng), rng.normal(size=(40, 3))
+    for product in (A @ B, rb.inverse_se3(A), np.tile(np.eye(4), (1, 1, 1))):
+        assert rb.is_se(product, 1e-13).all()
+    closed = [np.eye(4), np.diag([2.0, 2, 2, 1])]  # a finite set is closed
+    products = [a @ b for a in closed for b in closed]
+    assert not all(any(np.array_equal(p, c) for c in closed) for p in products)
+    assert not rb.is_se(closed[1], 1e-13)
+
+
 @pytest.mark.source("RR 1.4", "RR Fig. 1", "errata 21")
 def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
     printed = [-0.75271952, 0.38914789, 0.5310153, -0.38759388, 0.83566435, 0.1403134]
@@ -160,8 +190,7 @@ def test_the_reports_example_of_rank_two_has_one_nearest_rotation():
     R = rb.project_so(M)
     assert np.abs(R[np.triu_indices(3)] - printed).max() < 1e-8
     assert_nearest(R, M)
-    assert np.linalg.matrix_rank(M) == 2
-    # the nearest rotation is thus unique
+    # the nearest rotation is unique, although the rank of M is 2
     assert oracles.two_smallest_eigenvalues((R.T @ M)[None]) > 1
 
 

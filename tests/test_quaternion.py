@@ -60,6 +60,20 @@ def test_q_and_minus_q_have_one_canonical_form():
     assert np.array_equal(canonical_quaternion([-2e-16, 0.8, 0.6, 0]), [0, 0.8, 0.6, 0])
 
 
+@pytest.mark.source("BK 6.1", "errata 32")
+def test_two_opposite_points_of_the_sphere_are_one_rotation():
+    """The paper places S³ in RP³. S³ is in R⁴, and RP³ has one point for each pair q, −q."""
+    q = rb.sample_quaternion(50, rng=32)
+    assert np.abs(np.linalg.norm(q, axis=1) - 1).max() < 4 * EPS
+    assert np.abs(q - -q).max(axis=1).min() > 0.9  # two points of S³
+    R = rb.matrix_from_quaternion([q, -q])
+    assert np.array_equal(R[0], R[1])
+    projectors = q[:, :, None] * q[:, None]  # a point of RP³ is a line through 0, q qᵀ
+    apart = np.abs(projectors[:, None] - projectors).max(axis=(2, 3)) > 1e-3
+    turned = rb.angle_between(R[0][:, None], R[0]) > 1e-3
+    assert np.array_equal(apart, turned)
+
+
 @pytest.mark.source("BK Remark 7")
 def test_slerps_agree_with_mpmath_and_the_paper():
     """The long way ends at −q1; its arc in R⁴ is longer than a quarter circle."""

@@ -9,22 +9,53 @@ import rbcourse as rb
 EPS = np.finfo(float).eps
 VECTORS = awkward.ROTATION_VECTORS
 RANDOM = np.random.default_rng(3).normal(size=(100, 3))
+REST = np.zeros(3)
 
 
-@pytest.mark.source("BK 2.1", "BK (2)", "errata 12")
+@pytest.mark.source("BK 2.1", "BK (2)")
 def test_hat_is_the_cross_product():
-    """The printed L_i⁰ = e_i are vectors, not matrices. The printed ω̂ in se(3) is not a 4 × 4
-    matrix."""
     w, x = RANDOM[:50], RANDOM[50:]
     assert np.array_equal(np.einsum("nij,nj->ni", rb.hat_so3(w), x), np.cross(w, x))
     assert np.array_equal(rb.vee_so3(rb.hat_so3(w)), w)
     symmetric = np.array([[2, 4, -8], [4, 1, 16], [-8, 16, 0]])
     assert np.abs(rb.vee_so3(rb.hat_so3(w) + symmetric) - w).max() < 16 * EPS
-    printed, corrected = np.eye(3), rb.BASIS_SO3
-    assert np.array_equal(corrected, rb.hat_so3(printed))
-    assert printed[0].shape != corrected[0].shape
-    with pytest.raises(ValueError, match="4, 4"):
-        rb.vee_se3(corrected[0])
+
+
+@pytest.mark.source("BK (2)", "errata 12")
+def test_components_in_the_basis_of_so3_are_the_angular_velocity_only_with_all_hats():
+    """The printed e₂ and e₃ are vectors. Added to a matrix, a vector may mean rows, columns or a
+    diagonal."""
+    w, e = np.array([0.3, -1.2, 0.8]), np.eye(3)
+    assert np.array_equal(np.tensordot(w, rb.BASIS_SO3, 1), rb.hat_so3(w))
+    for reading in (lambda v: v[None], lambda v: v[:, None], np.diag):
+        printed = w[0] * rb.hat_so3(e[0]) + w[1] * reading(e[1]) + w[2] * reading(e[2])
+        assert np.abs(printed - rb.hat_so3(w)).max() > 0.5
+
+
+@pytest.mark.source("BK 2.1", "errata 24")
+def test_the_basis_of_so3_spans_no_twist_with_a_linear_velocity():
+    """The printed ω̂ in se(3) has components in a basis of se(3), not of so(3)."""
+    S = np.array([0.3, -1.2, 0.8, 2, 0, -1.5])
+    turns = rb.BASIS_SE3[:3].reshape(3, 16).T
+    for twist, rest in ((S, np.linalg.norm(S[3:])), (np.append(S[:3], REST), 0)):
+        matrix = rb.hat_se3(twist).ravel()
+        found, *_ = np.linalg.lstsq(turns, matrix)
+        assert np.abs(found - S[:3]).max() < 8 * EPS
+        assert abs(np.linalg.norm(turns @ found - matrix) - rest) < 8 * EPS
+
+
+@pytest.mark.source("BK 2.5", "errata 29")
+def test_only_half_turns_have_the_trace_minus_one_and_two_rotation_vectors():
+    """The paper prints that angles *up to* π are excluded."""
+    axes = awkward.UNIT_AXES[::5]
+    for angle in (0.5, 2.0, 3.0, np.pi - 1e-3):
+        R = rb.exp_so3(angle * axes)
+        assert np.all(np.trace(R, axis1=1, axis2=2) > -1 + 1e-7)
+        assert np.abs(rb.log_so3(R) - angle * axes).max() < 16 * EPS
+        assert np.abs(R - rb.exp_so3(-angle * axes)).max(axis=(1, 2)).min() > 1e-3
+    half = rb.exp_so3(np.pi * axes)
+    assert np.abs(np.trace(half, axis1=1, axis2=2) + 1).max() < 8 * EPS
+    assert np.abs(half - rb.exp_so3(-np.pi * axes)).max() < 8 * EPS
 
 
 @pytest.mark.source("BK 2.5")

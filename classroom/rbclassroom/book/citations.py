@@ -4,7 +4,11 @@ import re
 import unicodedata
 from collections.abc import Mapping
 
-_ACCENTS = {"'": "\N{COMBINING ACUTE ACCENT}", "v": "\N{COMBINING CARON}"}
+_ACCENTS = {
+    "'": "\N{COMBINING ACUTE ACCENT}",
+    '"': "\N{COMBINING DIAERESIS}",
+    "v": "\N{COMBINING CARON}",
+}
 _KEY = r"[A-Za-z]+\d{4}"
 _CITED = re.compile(rf"\[({_KEY}(?:[,;] {_KEY})*)\]")
 _WORK = re.compile(rf"^- \[({_KEY})\] ", re.MULTILINE)
@@ -19,7 +23,7 @@ def names(bibliography: str) -> dict[str, str]:
     {'Noakes2011': 'Noakes (2011)'}
     """
     plain = re.sub(
-        r"\\(['v])\{(\w)\}|\{\\(['v])(\w)\}",
+        r"\\(['\"v])\{(\w)\}|\{\\(['\"v])(\w)\}",
         lambda x: unicodedata.normalize("NFC", (x[2] or x[4]) + _ACCENTS[x[1] or x[3]]),
         bibliography,
     )

@@ -38,7 +38,16 @@ _MISPRINTS = """\
 ## Misprints
 
 The tests show that the printed form is wrong and the corrected form is right. (Entry 21 only looks
-like a misprint.)"""
+like a misprint.) Our copy of BK is text recognised from a scan, which loses dots, hats and the
+positions of indices. The last column tells for each entry whether the misprint is the authors', a
+loss of our copy, or either, and why we think so. We have not seen the publisher's pages."""
+ORIGINS = {
+    "authors": "the authors'",
+    "copy": "our copy",
+    "either": "either",
+    "none": "nobody's",
+}
+"""Whose a misprint is: the keys of sources.toml, and the words of the ledger."""
 
 
 @dataclass
@@ -129,11 +138,16 @@ def render(found: dict[str, Entry]) -> str:
             rows.append((key, WHAT[key], ", ".join(modules), ", ".join(lessons)))
         parts.append(f"## {title}\n\n{_table(('', 'what', 'modules', 'lessons'), rows)}")
     misprints = (
-        (key.removeprefix("errata "), row["where"], row["printed"], row["holds"])
+        (key.removeprefix("errata "), row["where"], row["printed"], row["holds"], whose(row))
         for key, row in MISPRINTS.items()
     )
-    head = ("", "where", "as printed in our copy", "corrected")
+    head = ("", "where", "as printed in our copy", "corrected", "whose")
     return "\n\n".join([*parts, _MISPRINTS, _table(head, misprints)]) + "\n"
+
+
+def whose(misprint: dict[str, str]) -> str:
+    """Return whether a misprint is the authors' or a loss of our copy, with the evidence."""
+    return f"{ORIGINS[misprint['origin']]}: {misprint['why']}"
 
 
 def _place(function: str) -> str:

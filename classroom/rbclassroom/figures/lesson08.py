@@ -1,4 +1,4 @@
-"""Lesson 8: spins of a book, its angular momentum, and arrows that a turning body carries."""
+"""Lesson 8: spins of a book, its angular momentum, and velocities that a turning body carries."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -150,20 +150,23 @@ CARRIED = {
     "parallel": ("path", 0.5),
     "constant in the body": ("z", 1.0),
 }
-"""The colours of three arrows on a turning body, and their turns as fractions of its turn."""
+"""The colours of three velocities, and the turns of their axes as fractions of the body's turn."""
 _NAMED = (0.75, 0.72), (-1.0, 0.95), (-0.7, -1.08)
-"""Places of the names of these arrows, after half a turn."""
+"""Places of the names of these velocities, after half a turn."""
 
 
 def carried_table(turned: Array) -> dict[str, Array]:
-    """Return the tips of the arrows of `CARRIED` after the body has turned by these angles."""
+    """Return the axes of the velocities of `CARRIED` after the body has turned by these angles."""
     angles = {name: np.pi / 6 + share * turned for name, (_, share) in CARRIED.items()}
     ends = {name: np.stack([np.cos(a), np.sin(a)], axis=-1) for name, a in angles.items()}
     return {"turn [rad]": turned} | columns("{} {} [1]", ends)
 
 
 def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
-    """Draw a body that turns in the plane, and the three arrows of `CARRIED` (BK (9))."""
+    """Draw a body that turns in the plane, and the axes of three velocities (`CARRIED`, BK (9)).
+
+    The axis of an angular velocity is drawn as an arrow with two heads.
+    """
     ends = vectors("{} {} [1]", carried_table(turned), "xy")
     for k, (ax, angle) in enumerate(zip(axes, turned, strict=True)):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -174,7 +177,8 @@ def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
             x, y = ends[name][k]
             ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
             head = (3, 0, np.degrees(np.arctan2(y, x)) - 90)
-            ax.plot(x, y, marker=head, ms=12, color=COLOURS[colour])
+            for place in (0.84, 1):
+                ax.plot(place * x, place * y, marker=head, ms=12, color=COLOURS[colour])
         ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.35), aspect="equal")
         ax.set_title(f"turned by {np.degrees(angle):.0f}°")
         ax.set_axis_off()
@@ -187,7 +191,8 @@ def describe_carried(turned: Array) -> str:
     """Return a description of the picture of `draw_carried`."""
     angles = ", ".join(f"{np.degrees(angle):.0f}" for angle in turned)
     return (
-        f"An arrow that a body carries in three ways while it turns in the plane. After {angles} "
-        "degrees the one that is constant in the room has not turned, the one that is constant in "
-        "the body has turned with it, and the parallel one has turned by half as much."
+        "The axis of a second angular velocity, which a body carries in three ways while it turns "
+        f"in the plane. After {angles} degrees the velocity that is constant in the room has not "
+        "turned, the one that is constant in the body has turned with it, and the parallel one has "
+        "turned by half as much."
     )

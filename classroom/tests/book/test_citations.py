@@ -16,6 +16,7 @@ def test_a_work_is_cited_by_its_authors_and_year():
     wanted = {
         "Arvo1992": "Arvo (1992)",
         "CrouchSilvaLeite1995": "Crouch and Silva Leite (1995)",
+        "Juttler1994": "Jüttler (1994)",
         "NoakesHeinzingerPaden1989": "Noakes et al. (1989)",
         "SeguinKressner2022": "Séguin and Kressner (2022)",
         "ZefranKumarCroke1998": "Žefran et al. (1998)",
