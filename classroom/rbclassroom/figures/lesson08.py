@@ -176,9 +176,10 @@ def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
         for name, (colour, _) in CARRIED.items():
             x, y = ends[name][k]
             ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
-            head = (3, 0, np.degrees(np.arctan2(y, x)) - 90)
-            for place in (0.84, 1):
-                ax.plot(place * x, place * y, marker=head, ms=12, color=COLOURS[colour])
+            along = np.array([[x, y], [-y, x]])
+            head = np.array([[0, 0], [-1, 0.4], [-1, -0.4]]) @ along
+            for place in (0.82, 1):
+                ax.plot(place * x, place * y, marker=head.tolist(), ms=17, color=COLOURS[colour])
         ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.35), aspect="equal")
         ax.set_title(f"turned by {np.degrees(angle):.0f}°")
         ax.set_axis_off()
