@@ -45,7 +45,7 @@ ORIGINS = {
     "authors": "the authors'",
     "copy": "our copy",
     "either": "either",
-    "none": "nobody's",
+    "none": "no misprint",
 }
 """Whose a misprint is: the keys of sources.toml, and the words of the ledger."""
 
