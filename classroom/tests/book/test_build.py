@@ -269,7 +269,8 @@ def test_the_ledger_has_a_row_for_every_key(source):
         "rr-fig-6": ["report_fig6"],
     }.items():
         assert sorted(re.findall(r"figures\.html#(\w+)", row(page, key)[5])) == names
-    assert "code/tests/" in row(page, "misprint-9")[4]
+    assert row(page, "misprint-12")[4].startswith("our copy: ")
+    assert "code/tests/" in row(page, "misprint-9")[5]
 
 
 def row(page, anchor):
