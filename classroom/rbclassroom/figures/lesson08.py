@@ -178,8 +178,8 @@ def draw_carried(axes: Sequence[Axes], turned: Array) -> None:
             ax.plot([0, x], [0, y], lw=2.5, color=COLOURS[colour], label=name)
             along = np.array([[x, y], [-y, x]])
             head = np.array([[0, 0], [-1, 0.4], [-1, -0.4]]) @ along
-            for place in (0.82, 1):
-                ax.plot(place * x, place * y, marker=head.tolist(), ms=17, color=COLOURS[colour])
+            for share in (0.82, 1):
+                ax.plot(share * x, share * y, marker=head.tolist(), ms=17, color=COLOURS[colour])
         ax.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.35), aspect="equal")
         ax.set_title(f"turned by {np.degrees(angle):.0f}°")
         ax.set_axis_off()
