@@ -45,7 +45,7 @@ def as_array(
         raise ValueError(f"{name}: real numbers are wanted, got dtype {given.dtype}")
     if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
         wanted = ", ".join([*["..."] * stacked, *map(str, core)])
-        hint = _hint(core, given.shape)
+        hint = converter(given.shape) if core in ((3, 3), (4, 4)) else ""
         raise ValueError(f"{name}: shape ({wanted}) is wanted, got {given.shape}{hint}")
     array: Array = given.astype(np.float64, copy=copy)
     return array
@@ -242,20 +242,17 @@ def _matrices_of(value: Any) -> Any:
     return value
 
 
-def _hint(core: tuple[int | str, ...], shape: tuple[int, ...]) -> str:
-    """Name the function that makes matrices of the given arrays, if there is one."""
-    if core not in ((3, 3), (4, 4), ("n", "n")) or not shape:
-        return ""
-    converters = {
+def converter(shape: tuple[int, ...]) -> str:
+    """Name the function that makes rotations or poses of arrays of this shape, if there is one."""
+    if shape[-2:] in ((3, 3), (4, 4)):
+        return "; pose_from_components makes poses of rotations and positions" * (shape[-1] == 3)
+    makers = {
         3: "exp_so3 makes rotations of rotation vectors",
         4: "matrix_from_quaternion makes rotations of quaternions (w, x, y, z)",
         6: "pose_from_coordinates makes poses of rotation vectors and positions",
         7: "pose_from_components makes poses of rotations and positions",
     }
-    if core == (4, 4) and shape[-2:] == (3, 3):
-        return "; pose_from_components makes poses of rotations and positions"
-    converter = converters.get(shape[-1])
-    return f"; {converter}" if converter and shape[-2:] not in ((3, 3), (4, 4)) else ""
+    return f"; {makers[shape[-1]]}" if shape and shape[-1] in makers else ""
 
 
 def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_finite, first_index
+from rbcourse._checks import as_array, as_finite, converter, first_index
 from rbcourse._foam import write_cofactors
 from rbcourse._numerics import Array, blocks
 from rbcourse.projection import nearest
@@ -43,12 +43,13 @@ def as_poses(name: str, value: ArrayLike) -> Array:
 
 def as_rotations_or_poses(name: str, value: ArrayLike) -> tuple[Array, int]:
     """Return the matrices, and the dimension of their group: 3 for SO(3), 6 for SE(3)."""
-    A = as_finite(name, value, "n", "n")
-    if A.shape[-1] == 3:
+    A = as_array(name, value)
+    if A.shape[-2:] == (3, 3):
         return as_rotations(name, A), 3
-    if A.shape[-1] == 4:
+    if A.shape[-2:] == (4, 4):
         return as_poses(name, A), 6
-    raise ValueError(f"{name}: shape (..., 3, 3) or (..., 4, 4) is wanted, got {A.shape}")
+    wanted = "shape (..., 3, 3) or (..., 4, 4)"
+    raise ValueError(f"{name}: {wanted} is wanted, got {A.shape}{converter(A.shape)}")
 
 
 def as_unit_quaternions(name: str, value: ArrayLike) -> Array:

@@ -221,17 +221,15 @@ def _shares(curve: Curve, rows_of: Rows, count: int) -> dict[str, tuple[float, f
     if isinstance(c, Chain | Timed):
         starts, ends = c.times[:-1], np.nextafter(c.times[1:], -inf)
         t = np.unique([*t, *starts, *(starts + ends) / 2, *np.maximum(starts, ends)])
-    most: dict[str, tuple[float, float]] = {}
+    shares: dict[str, Array] = {}
     for part in blocks(len(t), _BLOCK):
         V, A, R = c(t[part], 1), c(t[part], 2), c(t[part])[:, :3, :3]
         for name, _, b, k in rows_of(V, A, R):
             share = np.linalg.norm(b + k, axis=-1) ** (0.5 if name in _SPEEDS else 1)
-            if share.max() > most.get(name, (0.0, 0.0))[0] * (1 + 1e-6):
-                first = np.argmax(share >= share.max() * (1 - 1e-6))
-                most[name] = float(share.max()), float(t[part][first]) + start
-            else:
-                most.setdefault(name, (0.0, start))
-    return most
+            largest = shares.setdefault(name, np.zeros(len(t)))
+            largest[part] = np.maximum(largest[part], share)
+    first = {name: np.argmax(x >= x.max() * (1 - 1e-6)) for name, x in shares.items()}
+    return {name: (float(x.max()), float(t[first[name]]) + start) for name, x in shares.items()}
 
 
 def _from_zero(curve: Curve) -> Curve:
