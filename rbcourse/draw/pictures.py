@@ -3,11 +3,14 @@
 import base64
 import io
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontPath
 from PIL import Image
 
 from rbcourse.draw.space import not_in_space, scenes
@@ -55,6 +58,28 @@ def png(picture: Image.Image) -> bytes:
     content = io.BytesIO()
     few_colours = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
     few_colours.save(content, "png", optimize=True)
+    return content.getvalue()
+
+
+class _Font(FontPath):
+    """The path of a font; fonts are in the order of their file names."""
+
+    def __lt__(self, other: Any) -> bool:
+        return Path(self).name.casefold() < Path(other).name.casefold()
+
+
+def pdf(fig: Figure) -> bytes:
+    """Return a figure as a PDF, with the same bytes wherever Python and the fonts are.
+
+    Matplotlib sorts the fonts in a PDF by their paths, which depend on the folders of Python and of
+    this package.
+    """
+    pages: Any = PdfPages(content := io.BytesIO(), metadata={"CreationDate": None})
+    pages.savefig(fig)
+    file = pages._ensure_file()
+    fonts = file._fontNames.items()
+    file._fontNames = {(_Font(*path._as_tuple()), subset): name for (path, subset), name in fonts}
+    pages.close()
     return content.getvalue()
 
 

@@ -22,7 +22,7 @@ from PIL import Image
 
 import rbcourse as rb
 from rbcourse.draw.display import Display, Player
-from rbcourse.draw.pictures import data_url, drawn, png
+from rbcourse.draw.pictures import data_url, drawn, pdf, png
 from rbcourse.draw.space import scenes
 
 # fontTools reports the dates of the fonts of formulas, which come with Matplotlib
@@ -119,7 +119,7 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
     fig.savefig(content, format="png")
     picture = png(Image.open(content))
     if folder:
-        fig.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+        (folder / f"{name}.pdf").write_bytes(pdf(fig))
         (folder / f"{name}.png").write_bytes(picture)
     shown = _turning(fig, name, alt) if scenes(fig) else None
     plt.close(fig)

@@ -2,7 +2,11 @@
 
 import html
 import re
+import shutil
+import subprocess
+import sys
 from itertools import combinations
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -25,6 +29,41 @@ def test_saved_files_have_the_same_bytes_each_time(tmp_path, monkeypatch):
     assert picture.png == files["line.png"]
     assert files["line.csv"] == b"t [1],theta [1]\n0,0\n0.5,0.333333333333\n1,1\n"
     assert plt.get_fignums() == []
+
+
+MOVED = """
+import sys
+from pathlib import Path
+import matplotlib.pyplot as plt
+from matplotlib.font_manager import fontManager
+from rbcourse.draw import save_figure
+
+moved = {path.name: path for path in Path(sys.argv[1]).rglob("*.ttf")}
+fontManager.ttflist = [x for x in fontManager.ttflist if Path(x.fname).name not in moved]
+for path in moved.values():
+    fontManager.addfont(path)
+plt.style.use(["default", "rbcourse.rbcourse"])
+fig, ax = plt.subplots()
+ax.set(xlabel="time", ylabel="$\\theta$")
+save_figure(fig, "line", {}, "a line")
+"""
+
+
+def test_a_pdf_is_the_same_wherever_the_fonts_are(tmp_path, monkeypatch):
+    """A new process finds the fonts of texts and formulas in folders whose names are exchanged."""
+    ours, theirs = save.__file__, plt.matplotlib.get_data_path()
+    fonts = [*Path(ours).parent.glob("*.ttf"), *Path(theirs, "fonts", "ttf").glob("cm*.ttf")]
+    for folder, order in (("a", "12"), ("b", "21")):
+        for font in fonts:
+            kept = tmp_path / folder / order[font.name.startswith("cm")]
+            kept.mkdir(parents=True, exist_ok=True)
+            shutil.copy(font, kept)
+        monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path / f"{folder}_figures"))
+        subprocess.run([sys.executable, "-c", MOVED, tmp_path / folder], check=True)
+    one, other = (tmp_path / f"{folder}_figures" / "line.pdf" for folder in "ab")
+    assert b"CourseSans" in one.read_bytes()
+    assert b"Cmmi10" in one.read_bytes()
+    assert one.read_bytes() == other.read_bytes()
 
 
 def seen(colour, matrix):
