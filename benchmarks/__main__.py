@@ -1,11 +1,14 @@
 """Run all contests, print the results, and write the CSV, the figure and the README's table."""
 
+import io
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
 from benchmarks import contests, figure, report, timing
+from rbcourse.draw.pictures import pdf
+from rbcourse.files import replace_file
 
 
 def main(chosen=contests.CONTESTS, folder=Path(__file__).parent, **options):
@@ -24,8 +27,9 @@ def main(chosen=contests.CONTESTS, folder=Path(__file__).parent, **options):
     written = report.read_csv(folder / "benchmarks.csv")
     report.update_readme(written, folder / "README.md")
     fig = figure.draw(written)
-    for ending, varying in ((".png", "Software"), (".pdf", "CreationDate")):
-        fig.savefig(folder / f"benchmarks{ending}", metadata={varying: None})  # the same bytes
+    fig.savefig(picture := io.BytesIO(), metadata={"Software": None})  # the same bytes each time
+    replace_file(folder / "benchmarks.png", picture.getvalue())
+    replace_file(folder / "benchmarks.pdf", pdf(fig))
 
 
 if __name__ == "__main__":

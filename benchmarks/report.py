@@ -1,9 +1,11 @@
 """Write the results of a run as printed lines, as CSV, and as the table in README.md."""
 
 import csv
+import io
 from decimal import ROUND_DOWN, Context
 
 from benchmarks.contests import OURS
+from rbcourse.files import replace_file
 
 START, END = "<!-- benchmarks -->\n", "<!-- end of benchmarks -->\n"
 TABLE = [
@@ -39,9 +41,10 @@ def line(row, bound):
 
 def write_csv(rows, path):
     """Write rows as CSV; numbers have four digits."""
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        texts = ([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()] for row in rows)
-        csv.writer(file, lineterminator="\n").writerows([rows[0], *texts])
+    texts = ([f"{x:.4g}" if isinstance(x, float) else x for x in row.values()] for row in rows)
+    table = io.StringIO()
+    csv.writer(table, lineterminator="\n").writerows([rows[0], *texts])
+    replace_file(path, table.getvalue().encode())
 
 
 def read_csv(path):
@@ -76,4 +79,4 @@ def update_readme(rows, path):
     """Replace the table between the two marks in the README."""
     before, rest = path.read_text("utf-8").split(START)
     text = before + START + readme_table(rows) + END + rest.split(END)[1]
-    path.write_text(text, encoding="utf-8", newline="\n")
+    replace_file(path, text.encode())

@@ -6,6 +6,7 @@ import csv
 import io
 import os
 import re
+import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from typing import TypeAlias
@@ -22,6 +23,7 @@ from rbcourse.se3 import check_path, join
 __all__ = [
     "load_plan",
     "read_path",
+    "replace_file",
     "save_plan",
     "write_path",
 ]
@@ -223,6 +225,40 @@ def load_plan(file: File, kind: str) -> Commands:
     return [_command(place, row) for place, row in rows]
 
 
+def replace_file(file: File, content: bytes) -> None:
+    """Write a file completely or not at all.
+
+    Other programs see either the old or the new content. If writing fails or is interrupted, the
+    old file remains. An existing file keeps its permissions. A symbolic link remains, and its
+    target is replaced.
+
+    Parameters
+    ----------
+    file : str or Path
+        The folder must exist.
+    content : bytes
+        The new content.
+    """
+    target = os.path.realpath(file)
+    ordinary = os.path.isfile(target) and os.access(target, os.W_OK)
+    if os.path.exists(target) and not ordinary:  # writes to a device or pipe; otherwise raises
+        with open(target, "wb") as stream:
+            stream.write(content)
+        return
+    part = os.path.join(os.path.dirname(target), f".{os.urandom(8).hex()}.part")
+    try:
+        with open(part, "xb") as stream:
+            stream.write(content)
+        if ordinary:
+            shutil.copymode(target, part)
+        os.replace(part, target)
+    except OSError as error:  # names the file and not its part
+        raise OSError(error.errno, error.strerror, os.fspath(file)) from error
+    finally:
+        with suppress(OSError):
+            os.unlink(part)
+
+
 def _is_tum(file: File) -> bool:
     suffix = os.path.splitext(file)[1].lower()
     if suffix not in (".csv", ".tum", ".txt"):
@@ -335,8 +371,7 @@ def write_csv(file: File, names: list[str], rows: Iterable[Iterable[float]]) -> 
 
 def write_text(file: File, text: str) -> None:
     """Write a text file with the same bytes on every system."""
-    with open(file, "w", encoding="utf-8", newline="\n") as stream:
-        stream.write(text)
+    replace_file(file, text.encode())
 
 
 def to_number(place: str, cell: str) -> float:

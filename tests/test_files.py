@@ -1,12 +1,14 @@
+import os
 import re
 
 import numpy as np
 import oracles
 import pytest
+from broken_disk import check_all_or_nothing
 from scipy.spatial.transform import RigidTransform, Rotation
 
 import rbcourse as rb
-from rbcourse.files import load_plan, save_plan
+from rbcourse.files import load_plan, replace_file, save_plan
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(111)
@@ -203,6 +205,59 @@ def test_a_file_that_was_cut_inside_its_last_line_is_refused(tmp_path, name):
     (tmp_path / "plan.csv").write_bytes((tmp_path / "plan.csv").read_bytes()[:-1])
     with pytest.raises(ValueError, match="line 2: the line has no line end"):
         load_plan(tmp_path / "plan.csv", "world")
+
+
+def test_a_replaced_file_keeps_its_permissions_and_links(tmp_path):
+    file, link = tmp_path / "a.bin", tmp_path / "link.bin"
+    replace_file(file, b"one")
+    (plain := tmp_path / "plain.bin").write_bytes(b"")
+    assert file.stat().st_mode == plain.stat().st_mode
+    file.chmod(0o640)
+    mode = file.stat().st_mode
+    try:
+        link.symlink_to("a.bin")
+    except OSError:  # Windows allows links only to some users
+        link = file
+    replace_file(str(link), b"\0two")
+    assert (file.read_bytes(), file.stat().st_mode) == (b"\0two", mode)
+    assert link is file or link.is_symlink()
+
+
+def test_files_that_cannot_be_written_are_named(tmp_path):
+    for file in (tmp_path / "no" / "a.csv", tmp_path):
+        with pytest.raises(OSError, match=re.escape(repr(str(file)))):
+            replace_file(file, b"1")
+    kept = tmp_path / "kept.csv"
+    kept.write_bytes(b"0")
+    kept.chmod(0o444)
+    if not os.access(kept, os.W_OK):  # the administrator may write all files
+        with pytest.raises(PermissionError):
+            replace_file(kept, b"1")
+        assert kept.read_bytes() == b"0"
+    assert sorted(tmp_path.iterdir()) == [kept]
+    kept.chmod(0o644)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such file")
+def test_a_device_is_written_and_not_replaced():
+    before = os.stat(os.devnull)
+    replace_file(os.devnull, b"1")
+    assert os.path.samestat(os.stat(os.devnull), before)
+
+
+@pytest.mark.parametrize("ending", ["csv", "tum"])
+@pytest.mark.parametrize("there", [True, False])
+def test_a_path_is_written_completely_or_not_at_all(tmp_path, ending, there):
+    file = tmp_path / f"path.{ending}"
+    if there:
+        rb.write_path(file, TIMES[:-1], POSES[:-1])
+    check_all_or_nothing(lambda: rb.write_path(file, TIMES, POSES), tmp_path)
+
+
+def test_a_plan_is_written_completely_or_not_at_all(tmp_path):
+    save_plan(tmp_path / "plan.csv", [([1, 0], 2)], "joints")
+    plan = [([1, 0, 0.25], 2)] * 9
+    check_all_or_nothing(lambda: save_plan(tmp_path / "plan.csv", plan, "world"), tmp_path)
 
 
 def test_a_missing_file_is_reported(tmp_path):

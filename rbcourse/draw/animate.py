@@ -7,14 +7,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
 from rbcourse.draw.display import Display, Player
-from rbcourse.draw.pictures import drawn, painter
-from rbcourse.draw.save import Table, caption, csv_text, figures_folder, save_figure
+from rbcourse.draw.pictures import drawn, painter, pdf
+from rbcourse.draw.save import Table, caption, csv_text, write_files
 from rbcourse.draw.space import scenes
+from rbcourse.files import replace_file
 
 Update = Callable[[int], Sequence[Any]]
 
@@ -38,7 +40,7 @@ class Animation(Player):
         """Write the animation to a file as a GIF that repeats forever."""
         if not self.pictures:
             raise ValueError("RBCOURSE_FIGURES is empty: the frames for a file were not drawn")
-        Path(path).write_bytes(gif(self.pictures, self.seconds))
+        replace_file(path, gif(self.pictures, self.seconds))
 
 
 def animate(
@@ -96,12 +98,18 @@ def save_animation(
     The files go to the folder of `save_figure`. The same input always gives the same bytes. The
     figure is closed.
     """
-    csv_text(data)  # checks the data before anything is written
+    table = csv_text(data).encode()
     animation = animate(fig, name, alt, update, frames, seconds, still)
-    save_figure(fig, name, data, alt)
-    if folder := figures_folder():
-        animation.save(folder / f"{name}.gif")
-        (folder / f"{name}.png").write_bytes(animation.shown)
+    write_files(
+        name,
+        lambda: {
+            "csv": table,
+            "gif": gif(animation.pictures, seconds),
+            "pdf": pdf(fig),
+            "png": animation.shown,
+        },
+    )
+    plt.close(fig)
     return replace(animation, caption=caption(alt, f"{name}.gif, .png, .pdf, .csv"))
 
 

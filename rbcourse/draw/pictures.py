@@ -78,7 +78,7 @@ def pdf(fig: Figure) -> bytes:
     pages.savefig(fig)
     file = pages._ensure_file()
     fonts = file._fontNames.items()
-    file._fontNames = {(_Font(*path._as_tuple()), subset): name for (path, subset), name in fonts}
+    file._fontNames = {(_Font(font, font.face_index), i): name for (font, i), name in fonts}
     pages.close()
     return content.getvalue()
 

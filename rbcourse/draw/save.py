@@ -24,6 +24,7 @@ import rbcourse as rb
 from rbcourse.draw.display import Display, Player
 from rbcourse.draw.pictures import data_url, drawn, pdf, png
 from rbcourse.draw.space import scenes
+from rbcourse.files import replace_file
 
 # fontTools reports the dates of the fonts of formulas, which come with Matplotlib
 logging.getLogger("fontTools").setLevel(logging.ERROR)
@@ -113,14 +114,10 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
     input always gives the same bytes. With 256 colours, the PNG is a third as large, without a
     visible difference.
     """
-    save_table(name, data)
-    folder = figures_folder()
-    content = io.BytesIO()
+    table, content = csv_text(data), io.BytesIO()
     fig.savefig(content, format="png")
     picture = png(Image.open(content))
-    if folder:
-        (folder / f"{name}.pdf").write_bytes(pdf(fig))
-        (folder / f"{name}.png").write_bytes(picture)
+    write_files(name, lambda: {"csv": table.encode(), "pdf": pdf(fig), "png": picture})
     shown = _turning(fig, name, alt) if scenes(fig) else None
     plt.close(fig)
     return shown or Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
@@ -137,9 +134,18 @@ def _turning(fig: Figure, name: str, alt: str) -> Player:
 
 def save_table(name: str, data: Table) -> None:
     """Save numbers as a CSV file in the folder of `save_figure`."""
-    text = csv_text(data)
+    table = csv_text(data)
+    write_files(name, lambda: {"csv": table.encode()})
+
+
+def write_files(name: str, contents: Callable[[], Mapping[str, bytes]]) -> None:
+    """Write the files of a figure, unless `RBCOURSE_FIGURES` is empty; the keys are their endings.
+
+    All contents are made before the first file is written.
+    """
     if folder := figures_folder():
-        (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
+        for ending, content in contents().items():
+            replace_file(folder / f"{name}.{ending}", content)
 
 
 def figures_folder() -> Path | None:

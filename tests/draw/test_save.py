@@ -11,6 +11,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from broken_disk import check_all_or_nothing
 
 from rbcourse.draw import animate, save
 
@@ -29,6 +30,21 @@ def test_saved_files_have_the_same_bytes_each_time(tmp_path, monkeypatch):
     assert picture.png == files["line.png"]
     assert files["line.csv"] == b"t [1],theta [1]\n0,0\n0.5,0.333333333333\n1,1\n"
     assert plt.get_fignums() == []
+
+
+@pytest.mark.parametrize("name", ["line", "new"])
+def test_the_files_of_a_figure_are_written_completely_or_not_at_all(tmp_path, monkeypatch, name):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
+
+    def draw(name, table):
+        fig, ax = plt.subplots(figsize=(1, 1))
+        (line,) = ax.plot(*table.values())
+        animate.save_animation(fig, name, table, "a line", lambda _: [line], 2)
+
+    draw("line", TABLE)
+    changed = {key: [0, *column] for key, column in TABLE.items()}
+    check_all_or_nothing(lambda: draw(name, changed), tmp_path)
+    plt.close("all")
 
 
 MOVED = """

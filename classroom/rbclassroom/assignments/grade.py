@@ -7,7 +7,6 @@ import io
 import logging
 import os
 import re
-import shutil
 import signal
 import sys
 import tempfile
@@ -33,6 +32,7 @@ from rbclassroom.assignments.handout import find_set, read_config
 from rbclassroom.assignments.locked_cells import Refused, grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.tables import update
+from rbcourse.files import replace_file
 
 WORKERS = 2  # number of students graded at the same time
 MEMORY = 1_500_000_000  # bytes, for each process
@@ -110,7 +110,7 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
         raise ValueError(f"{table} cannot be written; close it in other programs") from error
     before = Path(config.CourseDirectory.root, "gradebook.db")
     if before.exists():
-        shutil.copyfile(before, before.with_name(f"gradebook.before-{name}.db"))
+        replace_file(before.with_name(f"gradebook.before-{name}.db"), before.read_bytes())
     update(find_set(name, assignments))
     done = run_step(GenerateAssignment, config)
     if not done["success"]:
@@ -276,7 +276,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
         page = folder / "feedback" / student / name / f"{name}.html"
         with Gradebook(CourseDirectory(config=config).db_url) as gradebook:
             to_do = _to_do(gradebook.find_submission_notebook(name, name, student).grades)
-        page.write_text(_with_titles(page.read_text("utf-8"), graded, to_do), "utf-8")
+        replace_file(page, _with_titles(page.read_text("utf-8"), graded, to_do).encode())
     else:
         remarks.append(f"no feedback was written: {last_line(done)}")
     return remarks

@@ -2,17 +2,17 @@
 
 import csv
 import io
-import os
 from pathlib import Path
 from typing import Any
 
+from rbcourse.files import replace_file
+
 
 def write_whole(path: Path, content: bytes) -> Path:
-    """Write a file and make its folder; readers see either the old or the new file."""
+    """Write a file completely or not at all, and make its folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(f".{os.getpid()}.part")
-    part.write_bytes(content)
-    return part.replace(path)
+    replace_file(path, content)
+    return path
 
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:

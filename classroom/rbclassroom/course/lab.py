@@ -10,6 +10,7 @@ from typing import Any
 
 from rbclassroom.course.folder import require_writable
 from rbclassroom.course.notebooks import copy_lessons
+from rbcourse.files import replace_file
 
 TEACHERS = ["@jupyter/nbgrader"]
 PARTS = ["formgrader", "validate_assignment", "assignment_list", "course_list"]
@@ -50,15 +51,15 @@ def configure() -> Path:
         "KernelManager": {"transport_encryption": "auto"},
     }
     _write(folder / "jupyter_server_config.json", settings)
-    (folder / "jupyter_server_config.py").write_text(STILLS)
+    replace_file(folder / "jupyter_server_config.py", STILLS.encode())
     (folder / "custom").mkdir(exist_ok=True)
-    (folder / "custom" / "custom.css").write_text(DARK)
+    replace_file(folder / "custom" / "custom.css", DARK.encode())
     return folder
 
 
 def _write(path: Path, content: Any) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content))
+    replace_file(path, json.dumps(content).encode())
 
 
 def main() -> None:

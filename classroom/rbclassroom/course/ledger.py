@@ -11,6 +11,7 @@ from pathlib import Path
 import nbformat
 
 from rbclassroom.course.notebooks import lesson_paths
+from rbcourse.files import replace_file
 
 KEY = re.compile(
     r"\b(?:(?:BK|RR) (?:\(\d+\)|\d+(?:\.\d+)?|(?:Prop\.|Cor\.|Remark|Fig\.) \d+)"
@@ -164,7 +165,7 @@ def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 def main() -> None:
     """Write docs/ledger.md; the current folder is the course."""
     try:
-        Path("docs/ledger.md").write_text(render(collect(Path())), encoding="utf-8", newline="\n")
+        replace_file("docs/ledger.md", render(collect(Path())).encode())
     except (OSError, ValueError) as error:
         sys.exit(str(error))
 

@@ -6,6 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from rbcourse.files import replace_file
+
 COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
 LISTS = {  # what each list adds to the lists before it
     "environment.txt": COURSE,
@@ -41,7 +43,7 @@ def main() -> None:
         wanted += more
         lines = [line for line in compiled(wanted, now) if _pin(line) not in there]
         there.update(map(_pin, lines))
-        Path(name).write_text(HEAD + "\n".join(lines) + "\n", "utf-8", newline="\n")
+        replace_file(name, (HEAD + "\n".join(lines) + "\n").encode())
         print(f"{name}: {len(lines)} distributions")
 
 

@@ -5,7 +5,6 @@ import json
 import os
 import platform
 import re
-import shutil
 import tempfile
 import time
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from nbformat.sign import NotebookNotary
 from tornado.web import HTTPError
 
 from rbclassroom.course.agreement import reconciled_notebook, stale_figures
+from rbcourse.files import replace_file
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 # JupyterLab marks a notebook as changed if it has to add these metadata
@@ -189,11 +189,11 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
         stale = {Path(name).stem for name in stale_figures(Path(folder), figures)}
         changed = [path for path, text in texts.items() if path.read_text("utf-8") != text]
         for path in changed:
-            path.write_text(texts[path], encoding="utf-8", newline="\n")
+            replace_file(path, texts[path].encode())
         figures.mkdir(exist_ok=True)
         for file in drawn:
             if file.stem in stale:  # replace all files of a figure together
-                shutil.copyfile(file, figures / file.name)
+                replace_file(figures / file.name, file.read_bytes())
         if chosen == every:
             for file in {file for file in figures.iterdir() if file.is_file()}:
                 if file.name not in {each.name for each in drawn}:
@@ -223,15 +223,13 @@ def copy_lessons(lessons: Path, work: Path) -> None:
                 others = (target.with_stem(f"{path.stem}_{number}") for number in count(2))
                 target = next(other for other in others if not other.exists())
                 print(f"{path.name} has changed; your copy is kept, the new one is {target.name}")
-            target.write_bytes(copy)
+            replace_file(target, copy)
             try:
                 notary.sign(notebook)
             except OSError as error:
                 print(f"{target.name} is copied, but not marked as trusted: {error}")
             copied[path.name] = now
-            part = record.with_suffix(".part")
-            part.write_text(json.dumps(copied, indent=1), encoding="utf-8")
-            part.replace(record)
+            replace_file(record, json.dumps(copied, indent=1).encode())
 
 
 def _read_record(record: Path) -> dict[str, list[str]]:

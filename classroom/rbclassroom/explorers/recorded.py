@@ -16,6 +16,7 @@ from rbclassroom.explorers.explorer import Explorer, numbers
 from rbclassroom.explorers.paths import JOINED
 from rbcourse.draw.display import Player
 from rbcourse.draw.save import FORMS
+from rbcourse.files import replace_file
 
 _PAGE = Template("""\
 <!doctype html>
@@ -118,7 +119,7 @@ def write_pages(folder: Path) -> None:
         file = folder / f"{name}.html"
         if file.exists():
             page = reconciled(file.read_text("utf-8"), page)
-        file.write_text(page, encoding="utf-8", newline="\n")
+        replace_file(file, page.encode())
 
 
 def main() -> None:

@@ -25,6 +25,7 @@ from rbclassroom.course.notebooks import lesson_paths
 from rbclassroom.lecture.deck import mathjax, write
 from rbclassroom.lecture.slides import deck_of
 from rbclassroom.lecture.votes import Ballot, open_votes
+from rbcourse.files import replace_file
 
 HOST = "127.0.0.1"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
@@ -149,7 +150,7 @@ def print_pdf(address: str, pdf: Path) -> None:
         try:
             job = [found, *words, f"{address}?print-pdf&hold"]
             subprocess.run(job, capture_output=True, timeout=120)
-            shutil.copyfile(made, pdf)
+            replace_file(pdf, made.read_bytes())
         except (subprocess.TimeoutExpired, OSError) as error:
             raise ValueError(f"{found} could not print the slides: {error!r}") from error
     print(f"{pdf}: {pdf.stat().st_size / 1e6:.1f} MB")

@@ -19,6 +19,7 @@ from zipfile import ZipFile
 import pooch
 
 from rbclassroom.assignments.handout import pack
+from rbcourse.files import replace_file
 
 HERE = Path(__file__).parent
 LOCK = json.loads((HERE / "pyodide.json").read_text("utf-8"))
@@ -109,7 +110,7 @@ def _relock(folder: Path) -> None:
         wanted += package["depends"]
     core = {name: pooch.file_hash(str(folder / name)) for name in LOCK["core"]}
     lock = {"core": core, "info": official["info"], "packages": dict(sorted(packages.items()))}
-    (HERE / "pyodide.json").write_text(json.dumps(lock, indent=1) + "\n", "utf-8", newline="\n")
+    replace_file(HERE / "pyodide.json", (json.dumps(lock, indent=1) + "\n").encode())
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from rbclassroom.surveys.progress import bar
 from rbclassroom.surveys.survey import processes, survey
 from rbcourse import Array, Ends, bezier_long_so3, minimum_acceleration_so3
 from rbcourse.draw.save import csv_text
+from rbcourse.files import replace_file
 from rbcourse.metrics import METRIC_SO3, box_inertia
 
 BODIES = {
@@ -179,8 +180,7 @@ def make_tables(
         named = {"seed [1]": seed, "body": body}
         parts.append({k: np.full(len(table["curve"]), x) for k, x in named.items()} | table)
     for name, table in {"maps": maps(first, draws), "intervals": _joined(parts)}.items():
-        text = csv_text(table)
-        (tables / f"atlas_{name}.csv").write_text(text, encoding="utf-8", newline="\n")
+        replace_file(tables / f"atlas_{name}.csv", csv_text(table).encode())
 
 
 def _joined(parts: Sequence[Mapping[str, Array]]) -> dict[str, Array]:

@@ -2,11 +2,13 @@
 
 import os
 import runpy
+from functools import partial
 from pathlib import Path
 
 import nbformat
 import nbval.kernel
 import pytest
+from broken_disk import check_all_or_nothing
 from jupyter_client import KernelManager
 from jupyter_server.services.contents.largefilemanager import LargeFileManager
 from nbclient.exceptions import CellExecutionError
@@ -117,6 +119,22 @@ def test_storing_one_lesson_changes_no_other_file(tmp_path, monkeypatch):
         notebooks.regenerate(tmp_path, figures, ["03"])
 
 
+def test_lessons_and_figures_are_stored_completely_or_not_at_all(tmp_path, monkeypatch):
+    def execute(path, figures):
+        (figures / "plane.png").write_text("another picture")
+        return nbformat.writes(new_notebook(cells=[new_code_cell("2", id="cell-0")])) + "\n"
+
+    monkeypatch.setattr(notebooks, "execute", execute)
+    lessons, figures = tmp_path / "course" / "notebooks", tmp_path / "course" / "figures"
+    for folder in (lessons, figures):
+        folder.mkdir(parents=True)
+    notebook_at(lessons / "01_plane.ipynb", "1")
+    (figures / "plane.png").write_text("a picture")
+    write = partial(notebooks.regenerate, lessons, figures)
+    check_all_or_nothing(write, lessons.parent)
+    check_all_or_nothing(write, figures)
+
+
 @pytest.fixture
 def folders(tmp_path, monkeypatch):
     """Return a folder with one lesson and one assignment, and a folder to work in."""
@@ -143,6 +161,18 @@ def test_copies_of_lessons_are_trusted(folders):
     notary = NotebookNotary()
     assert notary.check_signature(nbformat.read(copy, as_version=4))
     notary.store.close()
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_copy_is_written_completely_or_not_at_all(folders, there):
+    """A copy that is cut off would count as the student's own work in all later versions."""
+    folders[1].mkdir()
+    if there:
+        notebooks.copy_lessons(*folders)
+    notebook_at(folders[0] / "01_plane.ipynb", "2")
+    check_all_or_nothing(lambda: notebooks.copy_lessons(*folders), folders[1])
+    assert new_version(folders) == ["01_plane.ipynb"]
+    assert '"2"' in (folders[1] / "01_plane.ipynb").read_text()
 
 
 @pytest.mark.parametrize("damaged", [None, b"", b"[]", b"{", b"\xff\xfe", b"null"])
