@@ -19,7 +19,10 @@ from rbclassroom.lecture.slides import deck_of
 ROOT = Path(__file__).parents[3]
 SLIDES = ROOT / "book" / "slides"
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
-FAULTS = Path(__file__).with_name("faults.js").read_text(encoding="utf-8")
+FAULTS, FORMULAS = (
+    Path(__file__).with_name(f"{name}.js").read_text(encoding="utf-8")
+    for name in ("faults", "formulas")
+)
 PICTURES = """() => [...document.querySelectorAll(".slides section section")]
   .flatMap((section, i) => [...section.querySelectorAll("figure > img")].map((image) => [
     i + 1, image.alt, image.naturalWidth]))"""
@@ -67,6 +70,10 @@ def test_every_slide_fits_and_is_legible_from_the_last_row(context, path, size, 
         opened(page, of(path) + theme)
         pictures = page.evaluate(PICTURES)
         faults, thin, widths = page.evaluate(FAULTS)
+        for width in (1280, 1920, 3840):
+            page.set_viewport_size({"width": width, "height": width * 9 // 16})
+            page.wait_for_function(f"Math.abs(Reveal.getScale() - {width} / 1920) < 0.01")
+            faults += [f"{width} pixels, slide {fault}" for fault in page.evaluate(FORMULAS)]
     assert faults == []
     assert len(thin) <= 3, thin
     for number, alt, pixels in pictures:  # the smallest letters have 13.5 points

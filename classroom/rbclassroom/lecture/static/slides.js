@@ -32,6 +32,7 @@ const fit = (figure) => {
 const settle = (section) => {
   const body = section.querySelector(".body"), words = section.querySelector(".words");
   const room = body.clientHeight - parseFloat(getComputedStyle(body).paddingTop), largest = 50;
+  const scale = body.getBoundingClientRect().width / body.offsetWidth; // rectangles are scaled, client widths are not
   const gaps = words.children.length + all("li", words).length, space = (more) => words.style.setProperty("--more", `${more}px`);
   const over = () => words.offsetHeight > room || all("table", words).some((table) => table.offsetWidth > words.clientWidth + 2);
   let trial = 0, more = 0;
@@ -42,7 +43,7 @@ const settle = (section) => {
     for (const box of all("mjx-container[display=true]", section)) {
       box.style.fontSize = "";
       const parent = box.parentElement, column = parent.clientWidth - 2 * parseFloat(getComputedStyle(parent).paddingLeft);
-      const width = box.querySelector("svg").getBoundingClientRect().width;
+      const width = box.querySelector("svg").getBoundingClientRect().width / scale;
       if (width > column + 1) box.style.fontSize = `${Math.max(62, Math.floor((98 * column) / width))}%`;
     }
   } while (over() && ++trial < largest - 34);
