@@ -70,6 +70,13 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
     box.corners = _box_faces(pose, edges)
 
 
+def _draw_outline(ax: Any, pose: Array, edges: float | Array) -> Faces:
+    """Draw the orange edges of a box."""
+    box = draw_box(ax, pose, edges)
+    box.set(colours=7 * ["none"], edgecolor=COLOURS["x"])
+    return box
+
+
 def draw_cube_motion(
     ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
 ) -> list[Any]:
@@ -79,7 +86,7 @@ def draw_cube_motion(
     cubes at the poses `compared`. Return the artists of the cubes, and then the stars (BK Fig. 5).
     """
     for pose in compared:
-        draw_box(ax, pose, side).set(colours=7 * ["none"], edgecolor=COLOURS["x"], zorder=-1)
+        _draw_outline(ax, pose, side).set_zorder(-1)
     cubes = [draw_box(ax, pose, side) for pose in poses]
     set_space(ax, poses[:, :3, 3], side, zoom=1.1)
     stars = draw_centre_path(ax, poses[:, :3, 3])
@@ -210,14 +217,18 @@ def describe_ways(ways: Mapping[str, Array]) -> str:
 
 
 def moving_boxes(
-    axes: Sequence[Any], motions: Mapping[str, Array], edges: float | Array
+    axes: Sequence[Any],
+    motions: Mapping[str, Array],
+    edges: float | Array,
+    compared: Array | None = None,
 ) -> Callable[[int], list[Any]]:
     """Draw a box for each motion, on separate axes; return a function that moves all boxes.
 
     The motions have the same number of poses. `edges` gives the lengths of a box's edges in m, or
     one length for cubes. Boxes that stay at the origin are drawn larger; they have the axes of the
-    fixed frame instead of a floor. Return ``update(i)``, which moves all boxes to pose i of their
-    motions and returns their artists.
+    fixed frame instead of a floor. On the last axes, an orange outline shows the box in the motion
+    `compared`. Return ``update(i)``, which moves all boxes to pose i of their motions and returns
+    their artists, the outline last.
     """
     ways = list(motions.values())
     boxes = [draw_box(ax, poses[0], edges) for ax, poses in zip(axes, ways, strict=True)]
@@ -229,6 +240,10 @@ def moving_boxes(
             reach = 0.5 * float(np.linalg.norm(edges * np.ones(3)))
             set_turning(ax, reach, zoom=1.5, named=True)
         ax.set_title(name)
+    if compared is not None:
+        ways.append(compared)
+        boxes.append(_draw_outline(axes[-1], compared[0], edges))
+        boxes[-1].set_linewidth(2)
 
     def update(i: int) -> list[Any]:
         for box, poses in zip(boxes, ways, strict=True):

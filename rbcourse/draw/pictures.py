@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontPath
 from PIL import Image
 
 from rbcourse.draw.space import not_in_space, scenes
@@ -61,24 +59,25 @@ def png(picture: Image.Image) -> bytes:
     return content.getvalue()
 
 
-class _Font(FontPath):
-    """The path of a font; fonts are in the order of their file names."""
-
-    def __lt__(self, other: Any) -> bool:
-        return Path(self).name.casefold() < Path(other).name.casefold()
-
-
 def pdf(fig: Figure) -> bytes:
     """Return a figure as a PDF, with the same bytes wherever Python and the fonts are.
 
     Matplotlib sorts the fonts in a PDF by their paths, which depend on the folders of Python and of
-    this package.
+    this package. Here they are sorted by their file names.
     """
+    # the pages of the book have no fontTools, which this module loads, and an older Matplotlib
+    from matplotlib.backends.backend_pdf import PdfPages
+    from matplotlib.font_manager import FontPath
+
+    class Font(FontPath):
+        def __lt__(self, other: Any) -> bool:
+            return Path(self).name.casefold() < Path(other).name.casefold()
+
     pages: Any = PdfPages(content := io.BytesIO(), metadata={"CreationDate": None})
     pages.savefig(fig)
     file = pages._ensure_file()
     fonts = file._fontNames.items()
-    file._fontNames = {(_Font(font, font.face_index), i): name for (font, i), name in fonts}
+    file._fontNames = {(Font(path, path.face_index), i): name for (path, i), name in fonts}
     pages.close()
     return content.getvalue()
 

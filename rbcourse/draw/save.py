@@ -17,6 +17,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from numpy.typing import ArrayLike
 from PIL import Image
 
@@ -115,6 +116,8 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
     visible difference.
     """
     table, content = csv_text(data), io.BytesIO()
+    if fig.get_layout_engine() is None:  # savefig would leave the figure with that of the style
+        fig.set_layout_engine(PlaceHolderLayoutEngine(True, True))
     fig.savefig(content, format="png")
     picture = png(Image.open(content))
     write_files(name, lambda: {"csv": table.encode(), "pdf": pdf(fig), "png": picture})

@@ -64,6 +64,18 @@ def test_a_box_that_stays_at_the_origin_fills_its_axes(axes):
         assert np.linalg.norm(np.cross(text.get_position_3d(), eye)) == pytest.approx(1.1 * reach)
 
 
+def test_an_outline_follows_the_compared_motion(axes):
+    motions = {"screw": SCREW, "geodesic": GEODESIC}
+    update = bodies.moving_boxes(axes, motions, 2.0, SCREW)
+    in_body = bodies.draw_box(axes[0], np.eye(4), 2.0).corners
+    for i in (0, 5, 1):
+        *boxes, outline = update(i)
+        assert len(boxes) == 2
+        assert outline.axes is axes[1]
+        assert off(outline, SCREW[i], in_body) < 1e-14
+        assert off(boxes[1], GEODESIC[i], in_body) < 1e-14
+
+
 def test_paths_are_drawn_with_the_frames_at_their_ends(axes):
     places = [[1, 2, 3], [4, 0, 1]]
     lines = bodies.draw_ways(axes[0], MOTIONS, places)

@@ -47,6 +47,15 @@ def test_the_files_of_a_figure_are_written_completely_or_not_at_all(tmp_path, mo
     plt.close("all")
 
 
+def test_all_files_have_the_layout_of_the_figure(tmp_path, monkeypatch):
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
+    with plt.style.context("rbcourse.rbcourse"):
+        fig, ax = plt.subplots(layout="none")
+        fig.subplots_adjust(left=0.4)
+        save.save_figure(fig, "line", TABLE, "a line")
+        assert ax.get_position().x0 == pytest.approx(0.4)
+
+
 MOVED = """
 import sys
 from pathlib import Path
@@ -80,6 +89,13 @@ def test_a_pdf_is_the_same_wherever_the_fonts_are(tmp_path, monkeypatch):
     assert b"CourseSans" in one.read_bytes()
     assert b"Cmmi10" in one.read_bytes()
     assert one.read_bytes() == other.read_bytes()
+
+
+def test_only_a_pdf_loads_what_the_pages_with_python_do_not_have():
+    """They have no fontTools, and an older Matplotlib."""
+    code = "import sys, rbcourse.draw, rbcourse.report; "
+    code += "sys.exit('matplotlib.backends.backend_pdf' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def seen(colour, matrix):
