@@ -57,24 +57,22 @@ def numbers(name):
 
 def record(folder):
     """Make saved figures write their displayed data into a folder, and check their layout."""
-    import rbcourse.draw
     from rbcourse.draw import animate, save
 
-    save_figure, render, frames = save.save_figure, animate.render, {}
+    write_figure, render, frames = save.write_figure, animate.render, {}
 
-    def saved(fig, name, data, alt):
+    def written(fig, name, *files):
         pools = pooled([*frames.pop(fig, []), *by_names(fig.findobj())])
         (Path(folder) / f"{name}.pickle").write_bytes(pickle.dumps(pools))
-        picture = save_figure(fig, name, data, alt)
+        write_figure(fig, name, *files)
         check_looks(fig)
-        return picture
 
     def rendered(fig, update, count):
         frames[fig] = [pair for i in range(count) for pair in by_names(update(i))]
         return render(fig, update, count)
 
-    for module in (rbcourse.draw, save, animate):
-        module.save_figure = saved
+    for module in (save, animate):
+        module.write_figure = written
     animate.render = rendered
 
 

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from rbcourse.draw.display import Display, Player
-from rbcourse.draw.pictures import drawn, painter, pdf
-from rbcourse.draw.save import Table, caption, csv_text, write_files
+from rbcourse.draw.pictures import drawn, painter
+from rbcourse.draw.save import Table, caption, csv_text, write_figure
 from rbcourse.draw.space import scenes
 from rbcourse.files import replace_file
 
@@ -98,17 +98,12 @@ def save_animation(
     The files go to the folder of `save_figure`. The same input always gives the same bytes. The
     figure is closed.
     """
-    table = csv_text(data).encode()
+    table = csv_text(data)
     animation = animate(fig, name, alt, update, frames, seconds, still)
-    write_files(
-        name,
-        lambda: {
-            "csv": table,
-            "gif": gif(animation.pictures, seconds),
-            "pdf": pdf(fig),
-            "png": animation.shown,
-        },
-    )
+    pictures = {"png": animation.shown}
+    if animation.pictures:
+        pictures["gif"] = gif(animation.pictures, seconds)
+    write_figure(fig, name, table, pictures)
     plt.close(fig)
     return replace(animation, caption=caption(alt, f"{name}.gif, .png, .pdf, .csv"))
 

@@ -120,7 +120,7 @@ def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Play
         fig.set_layout_engine(PlaceHolderLayoutEngine(True, True))
     fig.savefig(content, format="png")
     picture = png(Image.open(content))
-    write_files(name, lambda: {"csv": table.encode(), "pdf": pdf(fig), "png": picture})
+    write_figure(fig, name, table, {"png": picture})
     shown = _turning(fig, name, alt) if scenes(fig) else None
     plt.close(fig)
     return shown or Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
@@ -138,16 +138,18 @@ def _turning(fig: Figure, name: str, alt: str) -> Player:
 def save_table(name: str, data: Table) -> None:
     """Save numbers as a CSV file in the folder of `save_figure`."""
     table = csv_text(data)
-    write_files(name, lambda: {"csv": table.encode()})
+    if folder := figures_folder():
+        replace_file(folder / f"{name}.csv", table.encode())
 
 
-def write_files(name: str, contents: Callable[[], Mapping[str, bytes]]) -> None:
-    """Write the files of a figure, unless `RBCOURSE_FIGURES` is empty; the keys are their endings.
+def write_figure(fig: Figure, name: str, table: str, pictures: Mapping[str, bytes]) -> None:
+    """Write the CSV, the PDF and the pictures of a figure; the keys of `pictures` are endings.
 
     All contents are made before the first file is written.
     """
     if folder := figures_folder():
-        for ending, content in contents().items():
+        files = {"csv": table.encode(), "pdf": pdf(fig), **pictures}
+        for ending, content in files.items():
             replace_file(folder / f"{name}.{ending}", content)
 
 
