@@ -12,7 +12,7 @@ FAILURES = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), KeyboardInterrupt()
 
 
 class HalfWritten:
-    """A file that stores half of what is written first, and then raises an error."""
+    """A file that stores half of the first content, and then raises an error."""
 
     def __init__(self, stream, error):
         self.stream, self.error = stream, error

@@ -91,8 +91,8 @@ def test_a_pdf_is_the_same_wherever_the_fonts_are(tmp_path, monkeypatch):
     assert one.read_bytes() == other.read_bytes()
 
 
-def test_only_a_pdf_loads_what_the_pages_with_python_do_not_have():
-    """They have no fontTools, and an older Matplotlib."""
+def test_only_a_pdf_loads_the_writer_of_pdfs():
+    """The pages in which Python runs have no fontTools, and an older Matplotlib."""
     code = "import sys, rbcourse.draw, rbcourse.report; "
     code += "sys.exit('matplotlib.backends.backend_pdf' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
