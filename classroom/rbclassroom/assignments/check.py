@@ -3,7 +3,6 @@
 Students run this module before they submit. It does not need nbgrader.
 """
 
-import argparse
 import io
 import logging
 import os
@@ -24,6 +23,7 @@ from rbclassroom.assignments.forbidden import find_in_cells
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test, name_cell
 from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient
 from rbclassroom.assignments.safe_files import write_whole
+from rbclassroom.course import options
 from rbclassroom.course.notebooks import KERNEL
 
 
@@ -170,12 +170,11 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
 
 def main() -> None:
     """Check a problem set: ``python -m rbclassroom.assignments.check FILE.ipynb``."""
-    parser = argparse.ArgumentParser(prog="python -m rbclassroom.assignments.check")
-    parser.add_argument("file", type=Path, help="the notebook to hand in, such as ps1.ipynb")
+    asked, _ = options.parse("check")
     if isinstance(sys.stdout, io.TextIOWrapper):  # some consoles cannot print every letter
         sys.stdout.reconfigure(errors="replace")
     try:
-        check(parser.parse_args().file.absolute())
+        check(asked.file.absolute())
     except (OSError, ValueError, nbformat.ValidationError) as error:
         sys.exit(f"nothing to submit was written: {error}")
 

@@ -3,7 +3,6 @@
 No code of the lessons is run.
 """
 
-import argparse
 import json
 import os
 import re
@@ -26,7 +25,7 @@ from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.lessons import write
 from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
 from rbclassroom.book.serve import serve
-from rbclassroom.course import ledger
+from rbclassroom.course import ledger, options
 from rbclassroom.course.folder import require_writable
 from rbclassroom.course.notebooks import lesson_paths, living
 from rbclassroom.lecture.deck import write as write_decks
@@ -326,13 +325,7 @@ def replace(book: Path, pages: Path, old: Path) -> list[str]:
 
 def main() -> None:
     """Make the book in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="python -m rbclassroom.book.build")
-    parser.add_argument("--serve", action="store_true", help="show the book in the browser")
-    parser.add_argument("--live", action="store_true", help="let Python run in its pages (+ 40 MB)")
-    parser.add_argument("--repository", default="", help="owner/name on GitHub, for Binder")
-    asked = parser.parse_args()
-    if not re.fullmatch(r"([\w.-]+/[\w.-]+)?", asked.repository):
-        parser.error(f"--repository: owner/name is wanted, got {asked.repository}")
+    asked, _ = options.parse("book")
     book = Path("book")
     try:
         build(Path(), book, asked.repository, engine.fetch() if asked.live else None)

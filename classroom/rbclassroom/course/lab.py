@@ -1,6 +1,5 @@
 """Open the lessons in JupyterLab."""
 
-import argparse
 import json
 import os
 import sys
@@ -8,6 +7,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from rbclassroom.course import options
 from rbclassroom.course.folder import require_writable
 from rbclassroom.course.notebooks import copy_lessons
 from rbcourse.files import replace_file
@@ -64,11 +64,7 @@ def _write(path: Path, content: Any) -> None:
 
 def main() -> None:
     """Open lesson 00 in JupyterLab, which runs until Ctrl-C."""
-    parser = argparse.ArgumentParser(
-        prog="course.py lab", epilog="Further arguments go to JupyterLab."
-    )
-    parser.add_argument("--edit", action="store_true", help="edit originals, not copies in work/")
-    known, words = parser.parse_known_args()
+    known, words = options.parse("lab")
     try:
         require_writable(Path())
         if known.edit:

@@ -1,11 +1,11 @@
 """Write the lists of exact versions that course.py installs."""
 
-import argparse
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+from rbclassroom.course import options
 from rbcourse.files import replace_file
 
 COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
@@ -33,9 +33,7 @@ def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
 
 def main() -> None:
     """Write all lists into the folder of the course, which is the current one."""
-    parser = argparse.ArgumentParser(prog="course.py lock")
-    parser.add_argument("--upgrade", action="store_true", help="take the newest versions")
-    upgrade = ["--upgrade"] * parser.parse_args().upgrade
+    upgrade = ["--upgrade"] * options.parse("lock")[0].upgrade
     now = "".join(Path(name).read_text("utf-8") for name in LISTS if Path(name).exists())
     now = "\n".join(compiled("".join(LISTS.values()), now, *upgrade))
     wanted, there = "", set[str]()

@@ -1,10 +1,11 @@
 """Run the tests with the oldest or newest releases that our distributions allow."""
 
-import argparse
 import os
 import subprocess
 import sys
 from pathlib import Path
+
+from rbclassroom.course import options
 
 RANGES = ["-e", ".[draw,test]", "-e", "./classroom[lessons,grading]"]
 # lessons are not tested, because their outputs were stored with the releases of environment.txt
@@ -14,11 +15,7 @@ TESTS += ["--deselect=notebooks", "--deselect=tests/test_notebooks.py"]
 
 def main() -> None:
     """Make a new .venv-oldest or .venv-newest in the current folder, and run the tests in it."""
-    parser = argparse.ArgumentParser(
-        prog="course.py releases", epilog="Further arguments go to pytest."
-    )
-    parser.add_argument("which", choices=["oldest", "newest"])
-    known, words = parser.parse_known_args()
+    known, words = options.parse("releases")
     if known.which == "oldest" and sys.version_info >= (3, 13):
         sys.exit("The oldest releases exist only for Python 3.11 and 3.12; use one of these.")
     venv, uv = Path(f".venv-{known.which}"), [sys.executable, "-m", "uv"]

@@ -1,6 +1,5 @@
 """Explorers for pages without Python, with recorded states of some controls."""
 
-import argparse
 import html
 import sys
 from collections.abc import Mapping, Sequence
@@ -10,6 +9,7 @@ from string import Template
 from typing import Any
 
 from rbclassroom import explorers
+from rbclassroom.course import options
 from rbclassroom.course.agreement import reconciled
 from rbclassroom.course.notebooks import regenerate
 from rbclassroom.explorers.explorer import Explorer, numbers
@@ -124,10 +124,7 @@ def write_pages(folder: Path) -> None:
 
 def main() -> None:
     """Run lessons and explorers again, in the folder of the course, and store the changes."""
-    parser = argparse.ArgumentParser(prog="course.py figures")
-    help_ = "the number of a lesson, such as 03; by default all lessons and the explorers"
-    parser.add_argument("lessons", nargs="*", metavar="LESSON", help=help_)
-    lessons = parser.parse_args().lessons
+    lessons = options.parse("figures")[0].lessons
     try:
         regenerate(Path("notebooks"), Path("figures"), lessons)
     except (OSError, ValueError) as error:

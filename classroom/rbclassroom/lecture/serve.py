@@ -1,6 +1,5 @@
 """Show the slides of a lesson, with votes by phone if requested, or write them as PDF."""
 
-import argparse
 import asyncio
 import os
 import secrets
@@ -20,6 +19,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application, ErrorHandler, HTTPError, RequestHandler, StaticFileHandler
 
+from rbclassroom.course import options
 from rbclassroom.course.folder import port_of
 from rbclassroom.course.notebooks import lesson_paths
 from rbclassroom.lecture.deck import mathjax, write
@@ -158,13 +158,7 @@ def print_pdf(address: str, pdf: Path) -> None:
 
 def main() -> None:
     """Run the command ``course.py lecture`` in the folder of the course."""
-    parser = argparse.ArgumentParser(prog="course.py lecture")
-    parser.add_argument("lesson", help="number of the lesson, such as 01")
-    parser.add_argument("--no-browser", action="store_true", help="only print the address")
-    parser.add_argument("--pdf", action="store_true", help="only write the slides as PDF")
-    votes = "let phones vote, at this machine's ADDRESS in their network"
-    parser.add_argument("--votes", nargs="?", const="", metavar="ADDRESS", help=votes)
-    words = parser.parse_args()
+    words, _ = options.parse("lecture")
     # Ctrl-C ends the lecture even if the calling script ignores Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
