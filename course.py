@@ -16,16 +16,24 @@ if sys.version_info < (3, 11):
     )
 
 import ast
+import contextlib
+import errno
 import hashlib
 import json
 import os
+import runpy
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
+DISCARDED = ROOT / ".venv-discarded"  # the environment that is being replaced
+OPTIONS = ROOT / "classroom/rbclassroom/course/options.py"
+STAMP = "made-by-course.txt"  # in .venv; it lists what has been installed
 UV = os.environ.get("UV") or shutil.which("uv")
 LISTS = {  # lists of exact versions; an environment needs its own list and all lists before it
     "lessons": "environment.txt",
@@ -34,28 +42,24 @@ LISTS = {  # lists of exact versions; an environment needs its own list and all 
     "test": "tests/environment-test.txt",
 }
 PYTEST = "pytest -n auto --dist loadfile --no-loadscope-reorder"
-BROWSER = "pytest -n auto --dist worksteal classroom/tests/browser"
-TASKS = {  # the environment, commands and help of each task; the last command gets arguments
-    "lab": ("lessons", ["rbclassroom.course.lab"], "open the lessons in JupyterLab"),
+TASKS = {  # the environment, commands and purpose of each task; the last command gets arguments
+    "lab": ("lessons", ["rbclassroom.course.lab"], "open the lessons of the course in JupyterLab"),
     "check": ("lessons", ["rbclassroom.assignments.check"], "check a problem set: check FILE"),
     "book": ("book", ["rbclassroom.book.build"], "write the course as web pages, in book/"),
     "lecture": ("book", ["rbclassroom.lecture.serve"], "show slides to a class: lecture 01"),
     "handout": ("teach", ["rbclassroom.assignments handout"], "pack a problem set: handout ps1"),
     "collect": ("teach", ["rbclassroom.assignments collect"], "sort LMS downloads: collect FOLDER"),
     "grade": ("teach", ["rbclassroom.assignments grade"], "grade collected submissions: grade ps1"),
-    "test": ("test", [PYTEST], "run the tests and the lessons"),
+    "test": ("test", [PYTEST], "run all tests, or the tests in PATHS"),
     "releases": ("test", ["rbclassroom.course.releases"], "test with oldest or newest releases"),
-    "hostile": ("test", [PYTEST + " classroom/tests/hostile"], "grade harmful submissions"),
-    "browser": ("test", ["rbclassroom.book.build --live", BROWSER], "test pages in Chromium"),
-    "figures": ("lessons", ["rbclassroom.explorers.recorded"], "run lessons again; store changes"),
+    "figures": ("lessons", ["rbclassroom.explorers.recorded"], "draw all figures again"),
     "ledger": ("test", ["rbclassroom.course.ledger"], "write docs/ledger.md"),
     "atlas": ("lessons", ["rbclassroom.surveys.body_atlas"], "compute the atlas of real bodies"),
     "bench": ("test", ["benchmarks"], "compare times with other packages"),
     "lint": ("test", ["ruff check", "ruff format --check", "mypy"], "check style and types"),
     "lock": ("test", ["rbclassroom.course.lock"], "write the lists of exact versions"),
 }
-PATHS = "check", "collect"  # tasks that take a path, relative to the terminal's folder
-PLAIN = "ledger", "atlas", "bench"  # tasks without further arguments
+PATHS = "check", "collect", "test"  # tasks with paths, relative to the terminal's folder
 
 
 class SetUpError(Exception):
@@ -73,11 +77,10 @@ def main():
     if task not in TASKS:
         print("There is no task %r. Choose from: %s." % (task, ", ".join(TASKS)), file=sys.stderr)
         sys.exit(2)
-    if words and task in PLAIN:
-        sys.exit("'course.py %s' takes no options, got: %s" % (task, " ".join(words)))
-    if task in PATHS:
-        words = [os.path.abspath(word) if os.path.exists(word) else word for word in words]
-    environment, commands, _ = TASKS[task]
+    environment, commands, purpose = TASKS[task]
+    runpy.run_path(str(OPTIONS))["parse"](task, words, purpose)  # --help ends here
+    if task in PATHS and Path.cwd() != ROOT:
+        words = [from_here(word) for word in words]
     set_up(environment)
     if "pytest" in commands[-1]:  # each worker uses one processor, so one thread is enough
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -87,18 +90,30 @@ def main():
         run(*command.split(), *(words if command is commands[-1] else []))
 
 
+def from_here(word):
+    """Return an existing path, or a test in a file, as an absolute path."""
+    return os.path.abspath(word) if os.path.exists(word.partition("::")[0]) else word
+
+
 def run(*words):
     """Run a module with the Python of .venv, in the course's folder; exit if the module fails.
 
     Ctrl-C also reaches the module, and this function waits until the module ends.
     """
-    job = subprocess.Popen([python(), "-m"] + list(words), cwd=ROOT)
-    while True:
-        try:
-            code = job.wait()
-            break
-        except KeyboardInterrupt:
-            pass
+    code = None
+    try:
+        job = subprocess.Popen([python(), "-m"] + list(words), cwd=ROOT)
+        while code is None:
+            with contextlib.suppress(KeyboardInterrupt):
+                code = job.wait()
+    except OSError:  # this Python cannot be run
+        code = 1
+    finally:
+        if code is None:  # this process ends
+            job.terminate()
+    if code and count_files() < read_stamp().get("files", 0):
+        write_stamp({"unfinished": True})
+        sys.exit("Files of .venv are missing. Run the command again: it makes .venv again.")
     if code:
         sys.exit(code)
 
@@ -107,22 +122,62 @@ def set_up(environment):
     """Make .venv if necessary, and install the distributions of an environment."""
     names = list(LISTS)[: list(LISTS).index(environment) + 1]
     wanted = {name: fingerprint(ROOT / LISTS[name]) for name in names}
-    found = read_stamp()
-    if not found or found.get("lessons") != wanted["lessons"] or not os.path.exists(python()):
-        create(found)
-        found = {}
-    missing = [name for name in names if found.get(name) != wanted[name]]
-    if missing:
-        print("Installing", ", ".join(LISTS[name] for name in missing), end=" ", flush=True)
-        install(*[word for name in missing for word in ("-r", LISTS[name])])
+    if not not_installed(read_stamp(), wanted):
+        return
+    with alone():
+        found = read_stamp()  # another start may have changed it
+        missing = not_installed(found, wanted)
         if "lessons" in missing:
-            patiently(python(), "-c", "import matplotlib.pyplot")  # it searches for fonts once
-        write_stamp(dict(found, **{name: wanted[name] for name in missing}))
-        print(" done.", flush=True)
+            create(found)
+            found = {}
+        if missing:
+            print("Installing", ", ".join(LISTS[name] for name in missing), end=" ", flush=True)
+            install(*[word for name in missing for word in ("-r", LISTS[name])])
+            link()
+            if "lessons" in missing:
+                patiently(python(), "-c", "import matplotlib.pyplot")  # it searches for fonts once
+            installed = {name: wanted[name] for name in missing}
+            write_stamp(dict(found, files=count_files(), **installed))
+            print(" done.", flush=True)
+
+
+def not_installed(found, wanted):
+    """Return the lists that have to be installed: all lists if .venv has to be made again."""
+    if not found or "files" not in found or not os.path.exists(python()):
+        return list(wanted)
+    renewed = found.get("lessons") != wanted["lessons"]
+    return [name for name in wanted if renewed or found.get(name) != wanted[name]]
+
+
+@contextlib.contextmanager
+def alone():
+    """Wait until no other start changes .venv; the lock ends at the latest with this process."""
+    with open(str(VENV) + ".lock", "a") as file:
+        if not lock(file):
+            print("Waiting for another start of course.py, which makes .venv.", flush=True)
+            while not lock(file):
+                time.sleep(0.2)
+        yield
+
+
+def lock(file):
+    """Try to lock a file for this process; tell whether this succeeded."""
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True
 
 
 def create(found):
-    """Make an empty .venv in place of the existing one."""
+    """Make an empty .venv in place of the existing one; if interrupted, the next start goes on."""
     if found is None and os.path.lexists(VENV):
         delete = "Remove-Item -Recurse" if os.name == "nt" else "rm -r"
         sys.exit(
@@ -134,13 +189,15 @@ def create(found):
             "The environment has to be made again, but this Python belongs to it. Leave it with "
             "'deactivate', or call %s course.py." % getattr(sys, "_base_executable", "python3")
         )
-    try:
-        if VENV.exists():
-            shutil.rmtree(VENV)
-    except OSError as error:
-        sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
+    delete_discarded()
+    if VENV.exists():
+        try:
+            VENV.rename(DISCARDED)  # on Windows this fails, and nothing is lost, if .venv is in use
+        except OSError as error:
+            sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
     VENV.mkdir()
     write_stamp({"unfinished": True})  # for the next run, if this run is interrupted
+    delete_discarded()
     print("Making .venv", end=" ", flush=True)
     if UV:
         how = "--seed", "--allow-existing", "--python", sys.executable
@@ -148,6 +205,14 @@ def create(found):
     else:
         patiently(sys.executable, "-m", "venv", VENV)
     print(" done.", flush=True)
+
+
+def delete_discarded():
+    """Delete the environment that `create` has replaced, now or in an interrupted run."""
+    if DISCARDED.is_symlink():
+        DISCARDED.unlink()
+    elif DISCARDED.exists():
+        shutil.rmtree(DISCARDED)
 
 
 def install(*words):
@@ -164,6 +229,31 @@ def install(*words):
         except (SetUpError, OSError):
             quick = "--disable-pip-version-check", "--no-compile"
             patiently(*pip, "install", *quick, *words)
+
+
+def link():
+    """Replace the paths of both packages by relative paths, which are ASCII.
+
+    Python 3.11 and 3.12 do not read UTF-8 here on Windows.
+    """
+    site = site_packages()
+    for name, folder in (("rbcourse", ROOT), ("rbclassroom", ROOT / "classroom")):
+        (site / (name + ".pth")).write_text(os.path.relpath(folder, site) + "\n")
+
+
+def site_packages():
+    """Return the folder in which the Python of .venv looks for packages."""
+    code = "import sysconfig; print(sysconfig.get_path('purelib', 'venv', {'base': '.'}))"
+    words = [python(), "-I", "-S", "-c", code]  # -S: before `link`, it may fail to read its paths
+    return VENV / subprocess.check_output(words, text=True).strip()
+
+
+def count_files():
+    """Return the number of files that are installed in .venv; 0 if its Python cannot be run."""
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        places = os.walk(site_packages())
+        return sum(len(names) for place, _, names in places if "__pycache__" not in place)
+    return 0
 
 
 def settings_of_pip(*pip):
@@ -196,14 +286,20 @@ def patiently(*command, **settings):
     uv = {"UV_PYTHON_DOWNLOADS": "never", "UV_SYSTEM_CERTS": "true", "UV_NATIVE_TLS": "true"}
     environment = dict(dict(uv, **settings), **dict(os.environ, PIP_USER="0"))
     with tempfile.TemporaryFile("w+", errors="replace") as output:
+        streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}
         words = list(map(str, command))
-        job = subprocess.Popen(words, cwd=ROOT, env=environment, stdout=output, stderr=output)
-        while True:
-            try:
-                job.wait(timeout=2)
-                break
-            except subprocess.TimeoutExpired:
+        # in a session of their own, the command and its children can be ended together
+        job = subprocess.Popen(words, cwd=ROOT, env=environment, start_new_session=True, **streams)
+        try:
+            while job.poll() is None:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    job.wait(timeout=2)
+                    break
                 print(".", end="", flush=True)
+        finally:
+            if job.returncode is None:  # Ctrl-C, or this process ends
+                job.kill() if os.name == "nt" else os.killpg(job.pid, signal.SIGKILL)
+                job.wait()
         if job.returncode:
             output.seek(0)
             raise SetUpError("".join(output.readlines()[-25:]))
@@ -212,16 +308,18 @@ def patiently(*command, **settings):
 def read_stamp():
     """Return the record of the installed lists, or None if course.py did not make .venv."""
     try:
-        return json.loads((VENV / "made-by-course.txt").read_text())
-    except FileNotFoundError:
-        return None
-    except ValueError:  # the stamp is from an earlier version of course.py
+        content = json.loads((VENV / STAMP).read_text())
+    except ValueError:  # the stamp is from an earlier version of course.py, or is incomplete
         return {}
+    except OSError:
+        is_empty = VENV.is_dir() and not os.listdir(VENV)  # a start was interrupted
+        return {} if is_empty else None
+    return content if isinstance(content, dict) else {}
 
 
 def write_stamp(content):
     """Record the lists that are installed into .venv."""
-    (VENV / "made-by-course.txt").write_text(json.dumps(content))
+    (VENV / STAMP).write_text(json.dumps(content))
 
 
 def fingerprint(path):
@@ -230,10 +328,15 @@ def fingerprint(path):
 
 
 if __name__ == "__main__":
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) == signal.SIG_DFL:  # "nohup" sets SIG_IGN
+            signal.signal(number, lambda *_: sys.exit(143))
     try:
         main()
-    except SetUpError as error:
+    except (SetUpError, OSError) as error:
         print("\n%s" % error)
-        sys.exit("The set-up failed; README.md, 'When something goes wrong', may help.")
+        if getattr(error, "errno", None) in (errno.EACCES, errno.EPERM, errno.EROFS):
+            print("Copy the course to a folder in which you can write.")
+        sys.exit("The set-up failed; docs/set_up.md, 'Messages', may help.")
     except KeyboardInterrupt:
         sys.exit(130)

@@ -5,12 +5,10 @@ import importlib.metadata
 import json
 import os
 import re
-import runpy
 import subprocess
 import sys
 import tomllib
 import warnings
-from importlib.util import find_spec
 from pathlib import Path
 from textwrap import dedent
 from types import SimpleNamespace
@@ -121,169 +119,11 @@ def test_every_file_that_the_readme_links_to_exists():
         assert target.startswith("https://") or (ROOT / target).exists(), target
 
 
-@pytest.mark.parametrize(
-    ("words", "version", "message"),
-    [
-        (["--help"], (3, 10, 13), r"rbcourse needs Python 3\.11 or newer, .*3\.10 \(.*\)\."),
-        (["figure"], None, r"(?s).*There is no task 'figure'\. Choose from: lab, check.*"),
-    ],
-)
-def test_an_old_python_and_an_unknown_task_are_reported(
-    words, version, message, monkeypatch, capsys
-):
-    monkeypatch.setattr(sys, "argv", ["course.py", *words])
-    monkeypatch.setattr(sys, "version_info", version or sys.version_info)
-    with pytest.raises(SystemExit) as left:
-        runpy.run_path(str(ROOT / "course.py"), run_name="__main__")
-    said = capsys.readouterr()
-    assert re.fullmatch(message, (said.err or str(left.value.code)).strip())
-    assert said.out == ""
-
-
-def test_tasks_are_listed_if_none_is_given(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["course.py"])
-    course.main()
-    said = capsys.readouterr().out
-    for task in course.TASKS:
-        assert re.search(rf"^ +{task} +\w", said, re.MULTILINE), task
-    with pytest.raises(course.SetUpError, match=r"^no network\n$"):
-        course.patiently(sys.executable, "-c", "import sys; sys.exit('no network')")
-
-
 def test_uv_does_not_make_an_environment_of_its_own():
     assert tomllib.loads(read("pyproject.toml"))["tool"]["uv"]["managed"] is False
     script = re.search(r"(?s)^# /// script\n(.*?)^# ///\n", read("course.py"), re.MULTILINE)[1]
     header = tomllib.loads(script.replace("# ", ""))
     assert header == {"requires-python": PROJECT["requires-python"]}
-
-
-@pytest.fixture
-def done(tmp_path, monkeypatch):
-    """Give course.py a new folder, where it only records its commands; return their list."""
-    done = []
-
-    def pretend(*command, **_):
-        command = [str(word) for word in command]
-        done.append(command)
-        if "venv" in command:
-            assert course.read_stamp() == {"unfinished": True}
-            Path(course.python()).parent.mkdir(parents=True)
-            Path(course.python()).touch()
-
-    for path in course.LISTS.values():
-        (tmp_path / path).parent.mkdir(exist_ok=True)
-        (tmp_path / path).write_text("numpy")
-    monkeypatch.setattr(course, "ROOT", tmp_path)
-    monkeypatch.setattr(course, "VENV", tmp_path / ".venv")
-    monkeypatch.setattr(course, "UV", "uv")
-    monkeypatch.setattr(course, "patiently", pretend)
-    return done
-
-
-def installed(done):
-    return [command[command.index("-r") + 1 :: 2] for command in done if "-r" in command]
-
-
-def test_a_list_is_installed_again_only_if_it_changes(done):
-    for environment in ("lessons", "lessons", "teach", "test", "test", "lessons"):
-        course.set_up(environment)
-    lessons, teach, book, test = course.LISTS.values()
-    assert installed(done) == [[lessons], [teach], [book, test]]
-    (course.ROOT / teach).write_text("scipy")
-    course.set_up("teach")
-    assert teach in installed(done)[3]
-    assert sum("venv" in command for command in done) == 1
-
-
-@pytest.mark.parametrize(
-    "disturb",
-    [
-        lambda: (course.ROOT / "environment.txt").write_text("scipy"),
-        lambda: Path(course.python()).unlink(),
-        lambda: course.write_stamp({"unfinished": True}),
-        lambda: (course.VENV / "made-by-course.txt").write_text("version 0.26"),
-    ],
-    ids=["the environment has changed", "its Python is gone", "it was interrupted", "it is old"],
-)
-def test_the_environment_is_made_again_if_needed(done, disturb):
-    course.set_up("lessons")
-    (course.VENV / "old").touch()
-    disturb()
-    course.set_up("lessons")
-    assert sum("venv" in command for command in done) == 2
-    assert not (course.VENV / "old").exists()
-
-
-def test_an_environment_of_another_tool_is_left_alone(done):
-    (course.VENV / "lib").mkdir(parents=True)
-    message = r"\.venv was not made by course\.py.* 'rm -r \"/.*\.venv\"'"
-    with pytest.raises(SystemExit, match=message):
-        course.set_up("lessons")
-    assert (course.VENV / "lib").exists()
-    assert done == []
-
-
-def test_the_environment_in_use_is_not_made_again(done, monkeypatch):
-    course.set_up("lessons")
-    Path(course.python()).unlink()
-    monkeypatch.setattr(sys, "prefix", str(course.VENV))
-    with pytest.raises(SystemExit, match="deactivate"):
-        course.set_up("lessons")
-    assert course.VENV.exists()
-
-
-def test_pip_installs_the_packages_if_uv_fails(done, monkeypatch):
-    monkeypatch.setattr(course, "UV", None)
-    listed = "global.index-url='https://a/simple'\nglobal.extra-index-url='b\\nc'\n:env:.no='x'\n"
-    monkeypatch.setattr(course.subprocess, "run", lambda *_, **__: SimpleNamespace(stdout=listed))
-    assert course.settings_of_pip("pip") == {
-        "UV_INDEX_STRATEGY": "unsafe-best-match",
-        "UV_DEFAULT_INDEX": "https://a/simple",
-        "UV_INDEX": "b c",
-    }
-    pretend = course.patiently
-
-    def fails(*command, **settings):
-        pretend(*command, **settings)
-        if command[1] == "pip":
-            assert settings["UV_INDEX"] == "b c"
-            raise course.SetUpError("no index")
-
-    monkeypatch.setattr(course, "patiently", fails)
-    course.set_up("lessons")
-    make, fetch, by_uv, by_pip, _ = done
-    assert make[1:3] == ["-m", "venv"]
-    assert fetch[-1] == "uv"
-    assert Path(by_uv[0]).parts[-2:] == ("bin", "uv")
-    assert by_pip[:4] == [course.python(), "-m", "pip", "install"]
-    assert by_uv[-2:] == by_pip[-2:] == ["-r", "environment.txt"]
-
-
-@pytest.mark.parametrize("task", course.TASKS)
-def test_each_task_passes_its_arguments_to_its_modules(task, done, tmp_path, monkeypatch):
-    """Relative paths start at the folder in which the command is typed."""
-    ran = []
-    (tmp_path / "ps1.ipynb").touch()
-    monkeypatch.setattr(course, "run", lambda *given: ran.append(given))
-    words = [] if (plain := task in course.PLAIN) else ["ps1.ipynb", "--due", "2026"]
-    monkeypatch.setattr(sys, "argv", ["course.py", task, *words])
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "")
-    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
-    monkeypatch.chdir(tmp_path)
-    course.main()
-    environment, commands, _ = course.TASKS[task]
-    assert [*course.read_stamp()][-1] == environment
-    if task in course.PATHS:
-        words[0] = str(tmp_path / "ps1.ipynb")
-    assert ran[-1] == (*commands[-1].split(), *words)
-    assert [words[0] for words in ran] == [command.split()[0] for command in commands]
-    for name, *_ in ran:
-        assert find_spec(name), name
-    assert ("PYTHONDONTWRITEBYTECODE" in os.environ) is not ("pytest" in ran[-1])
-    if plain:
-        monkeypatch.setattr(sys, "argv", ["course.py", task, "--help"])
-        with pytest.raises(SystemExit, match="takes no options, got: --help"):
-            course.main()
 
 
 @pytest.mark.parametrize("which", ["oldest", "newest"])

@@ -7,27 +7,15 @@ import sys
 from pathlib import Path
 
 import pytest
-from packages import find_program
 from pages import watched
 from playwright.sync_api import expect, sync_playwright
 from servers import serving
-
-from rbclassroom.course.lab import configure
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
 PATIENCE = 600_000  # in milliseconds; enough for a slow machine
 QUIET = ["--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"]
 QUIET += ["--disable-background-networking", "--disable-component-update"]
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_sessionstart(session):
-    """Find a browser, and configure JupyterLab, before the workers start."""
-    if not (hasattr(session.config, "workerinput") or session.config.option.collectonly):
-        names = "chromium", "chromium-browser", "google-chrome", "msedge"
-        os.environ["CHROMIUM"] = os.environ.get("CHROMIUM") or find_program("chromium", *names)
-        configure()
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,78 @@
+"""Prepare the tests that need Chromium or a sandbox, or leave them out and say why."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from packages import find_program
+
+from rbclassroom.assignments import sandbox
+from rbclassroom.course.lab import configure
+
+HERE = Path(__file__).parent
+CHROMIUM = "chromium", "chromium-browser", "google-chrome", "msedge"
+
+
+def sandbox_for(named):
+    """Return why submissions cannot be graded in a sandbox, or ""."""
+    if named:
+        find_program("bubblewrap", "bwrap")
+    return sandbox.missing()
+
+
+def npm_for(named):
+    """Return why the JupyterHub is not tested, or ""."""
+    return "" if named else "it installs a JupyterHub with npm; to run it, name this folder"
+
+
+def pages_for(named):
+    """Make the book and configure JupyterLab; return why pages cannot be tested, or ""."""
+    from rbclassroom.live import engine
+
+    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUM)), None)
+    os.environ["CHROMIUM"] = found or (find_program("chromium", *CHROMIUM) if named else "")
+    if not os.environ["CHROMIUM"]:
+        return "Chromium is not found; install it, or set CHROMIUM to its path"
+    try:
+        engine.fetch()
+    except OSError as error:
+        return str(error)
+    configure()
+    print("Making the book ...", flush=True)
+    words = [sys.executable, "-m", "rbclassroom.book.build", "--live"]
+    if subprocess.run(words, cwd=HERE.parents[1], stdout=subprocess.DEVNULL).returncode:
+        raise pytest.UsageError("the book could not be made; the messages are above")
+    return ""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session):
+    """Prepare these tests before the workers start.
+
+    A folder is left out only if it is not named, but a folder above it.
+    """
+    config, here, ignored = session.config, Path.cwd(), session.config.option.ignore or []
+    config.left_out = {}
+    if hasattr(config, "workerinput") or config.option.collectonly:
+        return
+    paths = [here / word.partition("::")[0] for word in config.args]
+    for name, prepare in (("hostile", sandbox_for), ("browser", pages_for), ("hub", npm_for)):
+        folder = HERE / name
+        named = any(folder in (path, *path.parents) for path in paths)
+        inside = any(path in folder.parents for path in paths)
+        if named or (inside and folder not in [here / path for path in ignored]):
+            is_part = inside and config.option.keyword  # such as -k so3
+            reason = "with -k, it runs only if it is named" if is_part else prepare(named)
+            if named and reason:
+                raise pytest.UsageError(reason)
+            if reason:
+                config.option.ignore = [*(config.option.ignore or []), str(folder)]
+                config.left_out[name] = reason
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    for name, reason in config.left_out.items():
+        terminalreporter.write_line(f"Left out: classroom/tests/{name} ({reason})")
