@@ -285,6 +285,8 @@ def patiently(*command, **settings):
     """
     uv = {"UV_PYTHON_DOWNLOADS": "never", "UV_SYSTEM_CERTS": "true", "UV_NATIVE_TLS": "true"}
     environment = dict(dict(uv, **settings), **dict(os.environ, PIP_USER="0"))
+    if sys.flags.utf8_mode:  # uv calls Python with -I, which ignores PYTHONUTF8
+        environment["LC_ALL"] = "C.UTF-8"
     with tempfile.TemporaryFile("w+", errors="replace") as output:
         streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": output}
         words = list(map(str, command))
