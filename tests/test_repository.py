@@ -15,6 +15,7 @@ from types import SimpleNamespace
 from zipfile import ZipFile
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name as canonical
@@ -22,7 +23,7 @@ from packaging.utils import canonicalize_name as canonical
 import course
 import rbclassroom
 import rbcourse
-from rbclassroom.course import lab, releases
+from rbclassroom.course import lab, options, releases
 
 ROOT = Path(__file__).parents[1]
 PROJECT, CLASSROOM = (
@@ -112,11 +113,14 @@ def test_binder_and_the_citation_agree_with_the_package():
 
 
 def test_every_file_that_the_readme_links_to_exists():
-    text = re.sub("`[^`\n]+`", "", read("README.md") + read("CONTRIBUTING.md"))
-    targets = re.findall(r"\]\(([^)#]+?)\)", text)
-    assert targets
-    for target in targets:
-        assert target.startswith("https://") or (ROOT / target).exists(), target
+    for name in ("README.md", "CONTRIBUTING.md", "docs/set_up.md"):
+        text = re.sub("`[^`\n]+`", "", read(name))
+        targets = re.findall(r"\]\(([^)#]+?)\)|^\[\w+\]: (\S+)", text, re.MULTILINE)
+        assert targets
+        for target in map("".join, targets):
+            there = (ROOT / name).parent / target
+            assert there.exists() or target.startswith("https://"), target
+            assert "OWNER" not in target
 
 
 def test_uv_does_not_make_an_environment_of_its_own():
@@ -193,14 +197,43 @@ def test_the_last_lesson_agrees_with_the_citation_file():
     assert said["title"] in shown
 
 
-def test_every_task_is_listed_in_the_readme_or_in_contributing():
-    rows = r"^\| `(?:python3 )?course\.py (\w+)"
-    users, maintainers = (
-        re.findall(rows, read(name), re.MULTILINE) for name in ("README.md", "CONTRIBUTING.md")
+def test_every_task_is_listed_for_users_or_in_contributing():
+    """The README names the three tasks of the first minute."""
+    rows = r"^\| `(?:python3 )?course\.py (\w+)`? .*"
+    first, users, maintainers = (
+        re.findall(rows, read(name), re.MULTILINE)
+        for name in ("README.md", "docs/set_up.md", "CONTRIBUTING.md")
     )
-    assert {*users} == {"lab", "check", "book", "lecture", "handout", "collect", "grade"}
+    assert first == ["lab", "figures", "test"]
+    assert {*users} == {*first, "check", "book", "lecture", "handout", "collect", "grade"}
     assert {*users, *maintainers} == set(course.TASKS)
-    assert len(read("README.md").splitlines()) <= 130
+    assert len(read("README.md").splitlines()) <= 110
+
+
+def test_the_readme_and_the_page_of_the_set_up_state_the_same_sizes():
+    """Disk and download are those of the environments that the tasks of the README need."""
+    page = read("docs/set_up.md")
+    sizes = re.findall(r"^\| [^|]* \| [^|]* \| (\d+) MB[^|]* \| (\d+) MB", page, re.MULTILINE)
+    download, disk = (list(map(int, column)) for column in zip(*sizes, strict=True))
+    assert len(sizes) == len(course.LISTS)
+    for task in ("lab", "test"):
+        row = re.search(rf"^\| `python3 course.py {task}` .*$", read("README.md"), re.MULTILINE)[0]
+        stated = [int(number) for number in re.findall(r"(\d+) MB", row)]
+        last = [*course.LISTS].index(course.TASKS[task][0])
+        assert stated == [sum(download[: last + 1]), disk[last]]
+
+
+def test_the_book_is_published_only_if_all_tests_pass():
+    """The tests run with the oldest Python that the package allows."""
+    text = read(".github/workflows/tests.yml")
+    jobs = yaml.safe_load(text)["jobs"]
+    matrix = jobs["test"]["strategy"]["matrix"]
+    assert len(matrix["system"]) == 3
+    assert PROJECT["requires-python"] == f">={matrix['python'][0]}"
+    assert {"run": "python course.py test"} in jobs["test"]["steps"]
+    assert jobs["publish"]["needs"] == "test"
+    assert "PUBLISH_BOOK" in jobs["publish"]["if"]
+    assert set(re.findall(r"course\.py (\w+)", text)) == {"test", "book"}
 
 
 def test_the_tests_listed_in_contributing_exist():
@@ -277,14 +310,14 @@ def test_wheels_import_completely_with_their_declared_dependencies(wheels, tmp_p
                 importlib.import_module(module.name)
                 print(name)
     """
-    readme = re.search(r"```python\n(.*?)```", read("README.md"), re.DOTALL)[1]
-    lines = re.findall(r"^>>> (.*)$", readme, re.MULTILINE) if case == "rbcourse" else []
+    lines = re.findall(r"^>>> (.*)$", read("README.md"), re.MULTILINE)
+    lines = lines if case == "rbcourse" else []
     words = [sys.executable, "-I", "-S", "-W", "ignore", "-c", "\n".join([dedent(code), *lines])]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
     assert done.stderr.splitlines()[-1:] == []
     assert len(done.stdout.split()) > 15
     if lines:
-        assert len(lines) <= 10
+        assert len(lines) <= 12
         header, *rows = (tmp_path / "motion.csv").read_text("utf-8").splitlines()
         assert header.startswith("time [s],x [m],")
         assert len(rows) == 101
@@ -307,7 +340,9 @@ def test_wheels_contain_types_and_styles(wheels):
 
 def test_tasks_and_options_in_documents_exist():
     teach = "classroom/rbclassroom/book/pages/teach/index.md"
-    text = "".join(map(read, ["README.md", "notebooks/assignments/README.md", teach]))
-    code = "".join(path.read_text("utf-8") for path in ROOT.glob("classroom/rbclassroom/**/*.py"))
-    assert all(f'"{x}"' in code for x in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
+    text = "".join(map(read, ["README.md", "docs/set_up.md", "notebooks/assignments/README.md", teach]))
+    known = {"--depth"}  # of git
+    for task in course.TASKS:
+        known.update(*(action.option_strings for action in options.parser(task)._actions))
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) <= known
     assert set(re.findall(r"course\.py ([a-z]+)", text)) <= set(course.TASKS)

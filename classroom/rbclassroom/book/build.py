@@ -189,10 +189,9 @@ class Sources:
         for path, page in PAGES.items():
             text = self.read(path)
             if path == "README.md":
-                self.shown["run"] = relinked(
-                    text[text.index("| to learn |") : text.index("<!--")], path, page
-                )
-                continue  # the table is shown by a template
+                part = text[text.index("## More of the package") :]
+                self.shown["package"] = relinked(part, path, page)
+                continue  # the part is shown by a template
             if path == "notebooks/QUESTIONS.md":
                 text = reference.folded_answers(text)
             text = with_citations(text, self.works, listed(text), "references.html")
