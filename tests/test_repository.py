@@ -340,7 +340,9 @@ def test_wheels_contain_types_and_styles(wheels):
 
 def test_tasks_and_options_in_documents_exist():
     teach = "classroom/rbclassroom/book/pages/teach/index.md"
-    text = "".join(map(read, ["README.md", "docs/set_up.md", "notebooks/assignments/README.md", teach]))
+    text = "".join(
+        map(read, ["README.md", "docs/set_up.md", "notebooks/assignments/README.md", teach])
+    )
     known = {"--depth"}  # of git
     for task in course.TASKS:
         known.update(*(action.option_strings for action in options.parser(task)._actions))

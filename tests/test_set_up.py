@@ -1,7 +1,7 @@
 """course.py makes .venv, also after interruptions, and runs the tasks."""
 
 import errno
-import importlib
+import importlib.util
 import os
 import re
 import runpy
@@ -18,7 +18,7 @@ import psutil
 import pytest
 
 import course
-from rbclassroom.course import options
+from rbclassroom.course import lab, options
 
 ROOT = Path(__file__).parents[1]
 
@@ -405,3 +405,54 @@ def test_a_folder_that_cannot_be_written_is_reported(started, monkeypatch, capsy
         ),
         said,
     )
+
+
+def test_a_course_that_cannot_be_written_is_reported_by_lab(monkeypatch):
+    def refuse(*_):
+        raise PermissionError(errno.EACCES, "Permission denied", "work")
+
+    monkeypatch.setattr(lab, "copy_lessons", refuse)
+    monkeypatch.setattr(sys, "argv", ["lab"])
+    with pytest.raises(SystemExit, match="denied: 'work'\nCopy the course to a folder in which"):
+        lab.main()
+
+
+@pytest.fixture
+def prepare(monkeypatch):
+    """Return a function that starts a session of pytest on a machine without sandbox or browser.
+
+    It returns the folders that are left out, and those that pytest ignores.
+    """
+    place = ROOT / "classroom" / "tests" / "conftest.py"
+    spec = importlib.util.spec_from_file_location("prepared", place)
+    hooks = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(hooks)
+    monkeypatch.setattr(hooks.sandbox, "missing", lambda: "no sandbox")
+    monkeypatch.setattr(hooks.shutil, "which", lambda _: None)
+    monkeypatch.setattr(hooks, "find_program", lambda *_: "")
+    monkeypatch.setenv("CHROMIUM", "")
+    monkeypatch.chdir(ROOT)
+
+    def started(*args, ignore=(), keyword=""):
+        option = SimpleNamespace(collectonly=False, ignore=[*ignore], keyword=keyword)
+        config = SimpleNamespace(args=args, option=option)
+        hooks.pytest_sessionstart(SimpleNamespace(config=config))
+        return config.left_out, option.ignore
+
+    return started
+
+
+def test_tests_are_left_out_if_their_program_is_missing(prepare):
+    left_out, ignored = prepare("classroom", "tests")
+    assert left_out["hostile"] == "no sandbox"
+    assert "Chromium is not found" in left_out["browser"]
+    assert "npm" in left_out["hub"]
+    assert ignored == [str(ROOT / "classroom" / "tests" / name) for name in left_out]
+    assert prepare("tests", "classroom/tests/book/test_build.py") == ({}, [])
+    assert [*prepare("classroom", ignore=["classroom/tests/browser"])[0]] == ["hostile", "hub"]
+    assert "only if it is named" in prepare("classroom", keyword="so3")[0]["hostile"]
+    assert prepare("classroom/tests/hub") == ({}, [])
+    with pytest.raises(pytest.UsageError, match="no sandbox"):
+        prepare("classroom/tests/hostile/test_box.py::test_box")
+    with pytest.raises(pytest.UsageError, match="Chromium is not found"):
+        prepare("classroom/tests/browser", keyword="so3")

@@ -50,10 +50,7 @@ def pages_for(named):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session):
-    """Prepare these tests before the workers start.
-
-    A folder is left out only if it is not named, but a folder above it.
-    """
+    """Prepare these tests before the workers start; a folder that is named is never left out."""
     config, here, ignored = session.config, Path.cwd(), session.config.option.ignore or []
     config.left_out = {}
     if hasattr(config, "workerinput") or config.option.collectonly:
