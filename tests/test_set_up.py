@@ -309,10 +309,14 @@ def started(tmp_path):
     (folder / "uv").chmod(0o755)
     streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
 
+    def heed():  # a shell that runs the tests in the background lets them ignore Ctrl-C
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
     def start(**further):
         environment = os.environ | {"UV": str(folder / "uv"), "PYTHONPATH": ""} | further
         words = [sys.executable, str(folder / "course.py"), "lab"]
-        return subprocess.Popen(words, cwd=folder, env=environment, text=True, **streams)
+        settings = {"cwd": folder, "env": environment, "text": True, "preexec_fn": heed}
+        return subprocess.Popen(words, **settings, **streams)
 
     start.folder, start.log = folder, lambda: (folder / "log.txt").read_text().split()
     (folder / "log.txt").touch()
