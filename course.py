@@ -111,7 +111,7 @@ def run(*words):
     finally:
         if code is None:  # this process ends
             job.terminate()
-    if code and count_files() < read_stamp().get("files", 0):
+    if code and count_files() < (read_stamp() or {}).get("files", 0):
         write_stamp({"unfinished": True})
         sys.exit("Files of .venv are missing. Run the command again: it makes .venv again.")
     if code:
@@ -189,7 +189,7 @@ def create(found):
             "The environment has to be made again, but this Python belongs to it. Leave it with "
             "'deactivate', or call %s course.py." % getattr(sys, "_base_executable", "python3")
         )
-    delete_discarded()
+    shutil.rmtree(DISCARDED, ignore_errors=True)
     if VENV.exists():
         try:
             VENV.rename(DISCARDED)  # on Windows this fails, and nothing is lost, if .venv is in use
@@ -197,7 +197,7 @@ def create(found):
             sys.exit(".venv is in use (%s). Close JupyterLab and try again." % error)
     VENV.mkdir()
     write_stamp({"unfinished": True})  # for the next run, if this run is interrupted
-    delete_discarded()
+    shutil.rmtree(DISCARDED, ignore_errors=True)
     print("Making .venv", end=" ", flush=True)
     if UV:
         how = "--seed", "--allow-existing", "--python", sys.executable
@@ -205,14 +205,6 @@ def create(found):
     else:
         patiently(sys.executable, "-m", "venv", VENV)
     print(" done.", flush=True)
-
-
-def delete_discarded():
-    """Delete the environment that `create` has replaced, now or in an interrupted run."""
-    if DISCARDED.is_symlink():
-        DISCARDED.unlink()
-    elif DISCARDED.exists():
-        shutil.rmtree(DISCARDED)
 
 
 def install(*words):
@@ -232,10 +224,7 @@ def install(*words):
 
 
 def link():
-    """Replace the paths of both packages by relative paths, which are ASCII.
-
-    Python 3.11 and 3.12 do not read UTF-8 here on Windows.
-    """
+    """Write relative paths to both packages, because Python 3.12 may not read UTF-8 here."""
     site = site_packages()
     for name, folder in (("rbcourse", ROOT), ("rbclassroom", ROOT / "classroom")):
         (site / (name + ".pth")).write_text(os.path.relpath(folder, site) + "\n")

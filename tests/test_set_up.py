@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from textwrap import dedent
@@ -227,40 +228,36 @@ def test_the_options_need_only_the_standard_library():
     assert "--edit" in said
 
 
-def raise_at(moment, files):
-    """Return a function for `sys.settrace` that presses Ctrl-C at the n-th line of some files."""
-    count = 0
+class CtrlC:
+    """Press Ctrl-C at the n-th line that is run in some files, as a function for `sys.settrace`."""
 
-    def trace(frame, event, _):
-        nonlocal count
-        if frame.f_code.co_filename not in files:
+    def __init__(self, moment, files):
+        self.left, self.files = moment, files
+
+    def __call__(self, frame, event, _):
+        if frame.f_code.co_filename not in self.files:
             return None
         if event == "line":
-            count += 1
-            if count == moment:
+            self.left -= 1
+            if self.left == 0:
                 raise KeyboardInterrupt
-        return trace
-
-    return trace
+        return self
 
 
 @pytest.mark.filterwarnings("ignore::ResourceWarning")  # of files that are open at Ctrl-C
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_start_after_ctrl_c_at_any_moment_makes_a_working_environment(done):
     """The interrupted start renews an environment after an update of the course."""
-    files, moment, interrupted = {course.__file__, shutil.__file__}, 0, True
     course.set_up("lessons")
-    while interrupted:
+    moment, ctrl_c = 0, CtrlC(0, ())
+    while ctrl_c.left <= 0:  # it was pressed
         moment += 1
         (course.ROOT / "environment.txt").write_text(f"numpy=={moment}")
-        before, interrupted = sys.gettrace(), False
-        sys.settrace(raise_at(moment, files))
-        try:
+        before, ctrl_c = sys.gettrace(), CtrlC(moment, {course.__file__, shutil.__file__})
+        sys.settrace(ctrl_c)
+        with suppress(KeyboardInterrupt, OSError):  # shutil may close a file twice
             course.set_up("lessons")
-        except (KeyboardInterrupt, OSError):  # shutil may close a file twice
-            interrupted = True
-        finally:
-            sys.settrace(before)
+        sys.settrace(before)
         course.set_up("lessons")
         assert course.read_stamp()["lessons"] == course.fingerprint(course.ROOT / "environment.txt")
         assert not course.DISCARDED.exists()
