@@ -101,7 +101,7 @@ def test_a_list_is_installed_again_only_if_it_changes(done):
         lambda: Path(course.python()).unlink(),
         lambda: course.write_stamp({"unfinished": True}),
         lambda: (course.VENV / course.STAMP).write_text("version 0.26"),
-        lambda: (course.VENV / course.STAMP).write_text("[1, 2]"),
+        lambda: (course.VENV / course.STAMP).write_text('["files"]'),
         lambda: (course.VENV / course.STAMP).write_bytes(b"\xff"),
         lambda: shutil.rmtree(course.VENV) or course.VENV.mkdir(),
         lambda: course.VENV.rename(course.DISCARDED),
@@ -298,7 +298,8 @@ def started(tmp_path):
         "matplotlib/__init__.py": "",
         "matplotlib/pyplot.py": "",
         "classroom/rbclassroom/course/lab.py": lab,
-        "uv": f"#!{sys.executable}\n{UV}",
+        "uv.py": UV,
+        "uv": f'#!/bin/sh\nexec "{sys.executable}" uv.py "$@"\n',
     }
     for name, text in texts.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
