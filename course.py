@@ -330,4 +330,5 @@ if __name__ == "__main__":
             print("Copy the course to a folder in which you can write.")
         sys.exit("The set-up failed; docs/set_up.md, 'Messages', may help.")
     except KeyboardInterrupt:
+        print("\nThe set-up was stopped. The next start continues it.")
         sys.exit(130)

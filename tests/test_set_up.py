@@ -36,6 +36,7 @@ def test_an_old_python_and_an_unknown_task_are_reported(
 ):
     monkeypatch.setattr(sys, "argv", ["course.py", *words])
     monkeypatch.setattr(sys, "version_info", version or sys.version_info)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
     with pytest.raises(SystemExit) as left:
         runpy.run_path(str(ROOT / "course.py"), run_name="__main__")
     said = capsys.readouterr()
@@ -334,16 +335,17 @@ def test_two_first_starts_at_once_make_one_environment(started):
 
 
 @posix
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_the_children_of_an_interrupted_start_end(started, number):
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_the_children_of_an_interrupted_start_end(started, name):
     (started.folder / "forever").touch()
     job = started()
     while "child" not in started.log():
         assert job.poll() is None, job.stdout.read()
-    job.send_signal(number)
+    job.send_signal(getattr(signal, name))
     said, _ = job.communicate()
-    assert job.returncode == (130 if number == signal.SIGINT else 143)
+    assert job.returncode == (130 if name == "SIGINT" else 143)
     assert "Traceback" not in said
+    assert ("The next start continues it." in said) is (name == "SIGINT")
     left = [
         psutil.Process(int(word))
         for word in started.log()
@@ -394,6 +396,7 @@ def test_a_folder_that_cannot_be_written_is_reported(started, monkeypatch, capsy
         raise OSError(errno.EROFS, "Read-only file system", str(path))
 
     monkeypatch.setattr("builtins.open", refuse)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
     monkeypatch.setattr(sys, "argv", ["course.py", "lab"])
     with pytest.raises(SystemExit, match=r"^The set-up failed"):
         runpy.run_path(str(started.folder / "course.py"), run_name="__main__")
