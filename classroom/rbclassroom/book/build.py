@@ -189,7 +189,8 @@ class Sources:
         for path, page in PAGES.items():
             text = self.read(path)
             if path == "README.md":
-                part = text[text.index("## More of the package") :]
+                lessons, more = text.index("## Lessons"), text.index("## More of the package")
+                part = text[text.index("## Use the package") : lessons] + text[more:]
                 self.shown["package"] = relinked(part, path, page)
                 continue  # the part is shown by a template
             if path == "notebooks/QUESTIONS.md":
