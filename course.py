@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
 DISCARDED = ROOT / ".venv-discarded"  # the environment that is being replaced
 OPTIONS = ROOT / "classroom/rbclassroom/course/options.py"
-STAMP = "made-by-course.txt"  # in .venv; it lists what has been installed
+STAMP = "made-by-course.txt"  # in .venv; it names the installed lists
 UV = os.environ.get("UV") or shutil.which("uv")
 LISTS = {  # lists of exact versions; an environment needs its own list and all lists before it
     "lessons": "environment.txt",
