@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, matvec
 from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import along, chebyshev, grid
@@ -14,46 +15,71 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log, vee
 
-LONGEST = 100.0  # rad: greater lengths add no further full turns
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
 _TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
 
 
-def starts(ends: Ends, n: int, bend: Array | float = 0.0) -> tuple[NDArray[np.intp], Array]:
-    """Return the problem index of each starting curve, and these curves at n nodes.
+def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp], Array]:
+    """Return the problem index of each starting curve, and four curves at n nodes for each problem.
 
-    Let v be the rotation vector from the Bézier control point C₁ = R0 exp(ŵ0/3) to the control
-    point R1 exp(−ŵ1/3), for the short way or the long way. If ‖w0‖/3 + ‖w1‖/3 + `bend` is at least
-    2k − 1 full turns, both vectors v are also used with k additional full turns. `bend` is the
-    contribution of end accelerations. With β = 3t² − 2t³, the curve
+    The Bézier control points are C₁ = R0 exp(ŵ0/3) and R1 exp(−ŵ1/3). With β = 3t² − 2t³ and
+    rotation vectors v from C₁ to the other control point, two curves that have the given ends are
 
-        R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3,
+        R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3.
 
-    has the given ends. It does not depend on the choice of frames. The ends R1, R0, −w1, −w0 give
-    the reversed curve.
+    Let F be the motion from R0 whose velocity in the fixed frame is the line from R0 w0 to R1 w1
+    (or the cubic with the derivatives R0 a0 and R1 a1, if `accelerations` are given). It costs
+    least if the rotation at t = 1 is free. The other two curves are
+
+        R = F exp(β v̂),    v from F(1) to R1.
+
+    Each v turns the short way or the long way. The curves do not depend on the choice of frames.
+    The ends R1, R0, −w1, −w0 give the reversed curves. If all vectors are along one axis, the
+    number of full turns is the best one.
     """
     first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
     ahead, back = exp_so3(np.stack([first, -last]))
-    C1 = ends.R0 @ ahead
-    v = log(C1.mT @ ends.R1 @ back)
+    C1, F = ends.R0 @ ahead, _with_free_end(ends, n, *accelerations)
+    goals = C1.mT @ ends.R1 @ back, F[:, -1].mT @ ends.R1
+    v = np.concatenate([_both_ways(goal, first + last) for goal in goals])
+    t = grid(n).t[:, None]
+    between = exp_so3(t * t * (3 - 2 * t) * v[:, :, None])
+    over = exp_so3(t**3 * last[:, None] - (1 - t) ** 3 * first[:, None])
+    R = np.concatenate([C1[:, None] @ between[:2] @ over, F @ between[2:]])
+    return np.tile(np.arange(len(C1)), 4), R.reshape(-1, n, 3, 3)
+
+
+def _with_free_end(ends: Ends, n: int, *accelerations: Array) -> Array:
+    """Return the motion F of `starts` at n nodes, shape (N, n, 3, 3).
+
+    With the velocity L in the fixed frame, a ball turns from t to t + h by
+    ∫ L dt − h² (L(t) × L(t + h))/12, to fourth order in h.
+    """
+    t, starting = grid(n).t, (ends.R0, ends.R1) * 2
+    rates = map(_bounded, (ends.w0, ends.w1, *accelerations))
+    L = hermite([matvec(R, x) for R, x in zip(starting, rates, strict=False)], t[:, None, None])
+    turn = np.diff(np.tensordot(grid(n).integral, L, axes=1), axis=0)
+    turn -= np.diff(t)[:, None, None] ** 2 / 12 * np.cross(L[:-1], L[1:])
+    F = [ends.R0]
+    for step in exp_so3(turn):
+        F.append(step @ F[-1])
+    return np.stack(F, axis=1)
+
+
+def _both_ways(goal: Array, hint: Array) -> Array:
+    """Return two logarithms of `goal`: the shortest one, and the one that turns the other way.
+
+    If the shortest one is 0, the other one is along `hint`. Rounding does not choose between two
+    turns by π.
+    """
+    v = log(goal)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    # rounding must not choose between two turns by π
     other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
     v = np.where(other, v * (1 - 2 * np.pi / np.maximum(angle, 1)), v)
-    along_v = v + 1e-9 * (first + last)  # `along_v` has a direction even if v is 0
-    full = 2 * np.pi * along_v / np.maximum(np.linalg.norm(along_v, axis=-1), 1e-150)[:, None]
-    length = np.minimum(np.linalg.norm([first, last], axis=-1).sum(axis=0) + bend, LONGEST)
-    problem, turns = [], []
-    for more in range(int(length.max(initial=0) / (4 * np.pi) + 1.5)):
-        some = np.flatnonzero(length >= (4 * more - 2) * np.pi)
-        problem += [some, some]
-        turns += [(v + more * full)[some], (v - (more + 1) * full)[some]]
-    number, turn = np.concatenate(problem), np.concatenate(turns)
-    t = grid(n).t[:, None]
-    between = exp_so3(t * t * (3 - 2 * t) * turn[:, None])
-    over = exp_so3(t**3 * last[:, None] - (1 - t) ** 3 * first[:, None])
-    return number, C1[number, None] @ between @ over[number]
+    along_v = v + 1e-9 * hint
+    size = np.linalg.norm(along_v, axis=-1, keepdims=True)
+    return np.stack([v, v - 2 * np.pi * along_v / np.maximum(size, 1e-150)])
 
 
 def leading_sign(v: Array) -> Array:
@@ -143,18 +169,18 @@ def _bounded(w: Array) -> Array:
     return np.clip(w, -1e6, 1e6)
 
 
-def with_full_turns(R: Array, ends: Array, G: Array) -> Array:
-    """Return the curves R plus a full turn, in both directions, about each principal axis of G.
+def spun(R: Array, ends: Array, G: Array) -> Array:
+    """Return the curves R with more spin about the axis of the least principal moment of G.
 
-    With β = 10 t³ − 15 t⁴ + 6 t⁵ and unit vectors e along the axes, the new curves are
-    R exp(±2π β ê). The six stacks are concatenated. A full turn about the axis of a small moment
-    may lower the cost.
+    With γ = 10 t³ − 15 t⁴ + 6 t⁵ and a unit vector e along the axis, the new curves are
+    R exp(φ ê) with φ = ±2π γ (a full turn) and φ = ±π (4 t (1 − t))³ (forth and back). The four
+    stacks are concatenated.
     """
-    t = grid(R.shape[1]).t[:, None]
-    axes = np.moveaxis(np.linalg.eigh(G)[1], -1, 0)[:, :, None]
-    turns = exp_so3(2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2) * axes)
-    turned = np.concatenate([R @ turns, R @ turns.mT]).reshape(-1, *R.shape[1:])
-    return with_ends(turned, np.tile(ends, (6, 1, 1)))
+    t, axis = grid(R.shape[1]).t[:, None], np.linalg.eigh(G)[1][:, None, :, 0]
+    turns = 2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2), np.pi * (4 * t * (1 - t)) ** 3
+    more = exp_so3(np.stack(turns)[:, None] * axis)
+    curves = np.concatenate([R @ more, R @ more.mT]).reshape(-1, *R.shape[1:])
+    return with_ends(curves, np.tile(ends, (4, 1, 1)))
 
 
 def with_ends(R: Array, ends: Array) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
@@ -16,6 +15,7 @@ from rbcourse.bezier import corrected_bezier_so3
 from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.collocation import (
+    NODES,
     BallStationary,
     Equations,
     Failure,
@@ -31,12 +31,11 @@ from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, J
 from rbcourse.optimum.guesses import (
     SAME,
     between_free_motions,
-    cost_at_nodes,
     leading_sign,
     lowered,
+    spun,
     starts,
     with_ends,
-    with_full_turns,
 )
 from rbcourse.projection import nearest
 from rbcourse.so3 import log
@@ -54,24 +53,22 @@ class Limits:
     """
 
     nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
-    nodes_for_turns: int = 25  # nodes for bodies if full turns are added
+    nodes_for_bodies: int = 25  # `spun` curves have the next number of `NODES`
     nodes_for_jerk: int = 29  # the jerk needs more, since it has higher derivatives
-    nodes_for_all_starts: int = 33  # nodes if a start costs less than all solutions
-    nodes_for_very_fast: int = 65
+    more_nodes: tuple[int, int] = (33, 65)  # for fast problems, and if a start costs less
+    fast: tuple[float, float] = (24.0, 80.0)  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used
     followed: float = 1.1  # Newton's method starts from curves up to this cost ratio
     same_entries: float = 0.1  # starts count as equal if all entries of R differ by less than this
-    fast: float = 24.0  # if ‖w0‖ + ‖w1‖ is larger, all starts are tried
-    very_fast: float = 80.0  # if ‖w0‖ + ‖w1‖ is larger, `nodes_for_very_fast` is used
     known_cost: float = 1.01  # largest accepted ratio of a solution's cost to a start's cost
     one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
     flat: float = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
     bend: float = 0.5  # rad: size of the bend
-    turned: float = 3.0  # full turns are added to curves up to this cost ratio
-    turned_again: float = 1.2  # second full turns are added to curves up to this cost ratio
-    worth_a_turn: float = 0.3  # no turn is added if the cost is below this share of a turn's cost
-    promising_turn: float = 1.5  # after `new_turns`, curves above this cost ratio are dropped
+    spun: float = 1.3  # more spin is added to curves up to this cost ratio
+    spins: int = 3  # how often more spin is added
+    worth_a_turn: float = 0.3  # no spin is added if the cost is below this share of a turn's cost
+    promising: float = 1.5  # curves above this cost ratio are dropped before more steps
     starts: tuple[int, float] = (40, 5e-4)
-    new_turns: tuple[int, float] = (3, 5e-4)
+    brief: tuple[int, float] = (4, 5e-4)  # steps for new curves, before most are dropped
     on_more_nodes: tuple[int, float] = (40, 1e-4)
     bent: tuple[int, float] = (40, 1e-6)  # steps for bent curves, which may be near a saddle
     last: tuple[int, float] = (200, 0.0)  # used if the other pairs do not suffice
@@ -83,7 +80,7 @@ LIMITS = Limits()
 class Task(NamedTuple):
     """A stack of problems with one batch axis, and the functions that solve them.
 
-    If the functional is an `Effort`, the search also adds full turns to the starts, and bends
+    If the functional is an `Effort`, the search also adds spin to the starts, and bends
     solutions that turn about one axis, because such solutions may be saddles.
     """
 
@@ -157,6 +154,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
         functional,
         Stationary(functional, ends.R0, ends.R1, rates),
         start,
+        nodes=LIMITS.nodes_for_bodies,
         known={i: one for i, one in curves.items() if round_ones[i]},
     )
 
@@ -164,12 +162,9 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
 def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     """Return the problems of minimum jerk."""
     ends, rates = _flat(given, given.w0, given.w1, a0, a1)
-    # among turns about one axis, the turn by (w0 + w1)/2 + (a0 − a1)/12 costs least
-    bend = np.linalg.norm(rates[:, 2:], axis=-1).sum(axis=-1) / 6
 
     def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.take(index), n, bend[index])
-        return problem, with_ends(R, rates[index][problem])
+        return starts(ends.take(index), n, *rates[index, 2:].swapaxes(0, 1))
 
     equations = Stationary(Jerk(), ends.R0, ends.R1, rates)
     return Task(given.w0.shape[:-1], Jerk(), equations, start, nodes=LIMITS.nodes_for_jerk)
@@ -186,8 +181,8 @@ def cheapest(task: Task) -> list[Solution | Failure]:
     """Return the cheapest solution that is found for each problem.
 
     Gauss–Newton steps lower the costs of the starts, and Newton's method continues from the
-    cheapest ones. All starts are tried if no solution is found, or if a start, before or after
-    these steps, costs less than the solution. If this fails, more steps are made.
+    cheapest ones. Where no solution is found, or where a start costs less than the solution, the
+    search is repeated on more nodes. If this fails, more steps are made.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         return _searched(task)
@@ -197,66 +192,89 @@ def _searched(task: Task) -> list[Solution | Failure]:
     ends = task.equations.ends
     found: list[Solution | Failure] = [task.known.get(i, NOTHING) for i in range(len(ends))]
     index = np.flatnonzero([one is NOTHING for one in found])
-    if not len(index):
-        return found
     share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # weights of w and w' in a quintic
-    fast = np.linalg.norm(ends, axis=-1) @ share
-    problem, R = _started(task, index, task.nodes)
-    R, cost = lowered(task.functional.take(problem), R, *LIMITS.starts)
-    if isinstance(task.functional, Effort):
-        problem, R, cost = _with_more_turns(task, task.functional, problem, R, cost)
-    least = partial(_least, len(ends), problem)
-    likely = ~(cost > LIMITS.followed * least(cost)[problem]) & ~_repeated(problem, cost, R)
-    _follow(task, problem[likely], R[likely], found)
-    costly = _costs(found) > LIMITS.known_cost * least(cost)
-    again = np.unique(problem[(costly | (fast > LIMITS.fast))[problem]])
-    for n, some in (
-        (LIMITS.nodes_for_all_starts, fast <= LIMITS.very_fast),
-        (LIMITS.nodes_for_very_fast, ~(fast <= LIMITS.very_fast)),
-    ):
-        if some[again].any():
-            _follow_on(task, again[some[again]], problem, R, n, found)
-    if isinstance(task.functional, Effort):
+    first = np.searchsorted(LIMITS.fast, np.linalg.norm(ends, axis=-1) @ share)[index]
+    problem, R = np.zeros(0, int), np.empty((0, task.nodes, 3, 3))
+    bound, n = np.full(len(ends), np.inf), task.nodes
+    for level, n in enumerate((task.nodes, *LIMITS.more_nodes)):
+        costly = _costs(found) > bound
+        now = index[(first == level) | costly[index]]
+        if len(now):
+            problem, R, cost = _lowered_starts(task, now, n, problem, R)
+            likely = _promising(LIMITS.followed, len(ends), problem, R, cost)
+            _follow(task, problem[likely], R[likely], found)
+            bound[now] = LIMITS.known_cost * _least(len(ends), problem, cost)[now]
+    costly = (_costs(found) > bound)[problem]
+    if costly.any():
+        R, _ = lowered(task.functional.take(problem[costly]), R[costly], *LIMITS.last)
+        _follow(task, problem[costly], R, found)
+    for i in np.flatnonzero(_costs(found) > bound):
+        if isinstance(one := found[i], Solution):
+            found[i] = one._replace(beaten=True)
+    if isinstance(task.functional, Effort) and len(index):
         _leave_the_axis(task, task.functional, index, found)
     return found
 
 
-def _with_more_turns(
+def _lowered_starts(
+    task: Task, index: Numbers, n: int, problem: Numbers, R: Array
+) -> tuple[Numbers, Array, Array]:
+    """Return curves of low cost for some problems, and their costs; n is the number of nodes.
+
+    The curves come from the starts at n nodes and from the curves R of an earlier search.
+    """
+    more, starting = task.starts(index, n)
+    again = np.isin(problem, index)
+    problem = np.append(index[more], problem[again])
+    R = np.concatenate([starting, on_nodes(R[again], n)])
+    R = with_ends(R, task.equations.ends[problem])
+    R, cost = lowered(task.functional.take(problem), R, *LIMITS.starts)
+    if isinstance(task.functional, Effort):
+        return _with_more_spin(task, task.functional, problem, R, cost)
+    return problem, R, cost
+
+
+def _with_more_spin(
     task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
 ) -> tuple[Numbers, Array, Array]:
-    """Lower the costs of the cheapest curves, also with added full turns, on more nodes.
+    """Lower the costs of the cheapest curves, also with more spin, on more nodes.
 
-    The cheapest motion may turn once or twice more about the axis of a small moment. From rest to
-    rest, a full turn costs at least 12 (2π)² λ, where λ is the least eigenvalue of G M G. No turn
+    The optima of rods differ mainly in the angle about the axis of the least moment. From rest to
+    rest, a full turn costs at least 12 (2π)² λ, where λ is the least eigenvalue of G M G. No spin
     is added if the cheapest curve costs less than `worth_a_turn` times this cost.
     """
     ends, count = task.equations.ends, len(task.equations.ends)
     full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)[:, 0]
-    least = _least(count, problem, cost)
-    if not (least > LIMITS.worth_a_turn * full_turn)[problem].any():
+    worth = _least(count, problem, cost) > LIMITS.worth_a_turn * full_turn
+    if not worth[problem].any():
         return problem, R, cost
-    some = ~(cost > LIMITS.turned * least[problem]) & ~_repeated(problem, cost, R)
-    problem, R = problem[some], on_nodes(R[some], LIMITS.nodes_for_turns)
+    some = _promising(LIMITS.promising, count, problem, R, cost)
+    problem, R = problem[some], on_nodes(R[some], next(n for n in NODES if n > R.shape[1]))
     R, cost = lowered(effort.take(problem), with_ends(R, ends[problem]), *LIMITS.on_more_nodes)
-    turned = 0
-    for apart in LIMITS.turned, LIMITS.turned_again:
-        least = _least(count, problem, cost)
-        some = ~(cost > apart * least[problem]) & ~_repeated(problem, cost, R)
-        some &= (least > LIMITS.worth_a_turn * full_turn)[problem]
-        some[:turned] = False
+    old = 0
+    for _ in range(LIMITS.spins):
+        some = _promising(LIMITS.spun, count, problem, R, cost) & worth[problem]
+        some[:old] = False
         if not some.any():
             break
-        turned = len(some)
-        number = np.tile(problem[some], 6)
-        more = with_full_turns(R[some], ends[problem[some]], effort.G[problem[some]])
-        more, briefly = lowered(effort.take(number), more, *LIMITS.new_turns)
-        some = ~(briefly > LIMITS.promising_turn * least[number])
-        some &= ~_repeated(number, briefly, more)
-        number = number[some]
-        more, cost_of_more = lowered(effort.take(number), more[some], *LIMITS.on_more_nodes)
+        old, number = len(some), np.tile(problem[some], 4)
+        more = spun(R[some], ends[problem[some]], effort.G[problem[some]])
+        more, briefly = lowered(effort.take(number), more, *LIMITS.brief)
         problem, R = np.append(problem, number), np.concatenate([R, more])
-        cost = np.append(cost, cost_of_more)
+        cost = np.append(cost, briefly)
+        kept = _promising(LIMITS.promising, count, problem, R, cost)
+        kept[:old] = True
+        problem, R, cost = problem[kept], R[kept], cost[kept]
+        R[old:], cost[old:] = lowered(effort.take(problem[old:]), R[old:], *LIMITS.on_more_nodes)
     return problem, R, cost
+
+
+def _promising(
+    ratio: float, count: int, problem: Numbers, R: Array, cost: Array
+) -> NDArray[np.bool_]:
+    """Tell which curves have a cost up to this ratio, and are not close to a cheaper curve."""
+    least = _least(count, problem, cost)
+    return ~(cost > ratio * least[problem]) & ~_repeated(problem, cost, R)
 
 
 def _leave_the_axis(
@@ -298,33 +316,6 @@ def _across(w: Array, G: Array) -> Array:
     return np.concatenate([axes, -axes])
 
 
-def _follow_on(
-    task: Task,
-    index: Numbers,
-    problem: Numbers,
-    R: Array,
-    n: int,
-    found: list[Solution | Failure],
-) -> None:
-    """Solve some problems from more starts, on n nodes, where the costs are more accurate."""
-    mine = np.isin(problem, index)
-    problem, R = problem[mine], with_ends(on_nodes(R[mine], n), task.equations.ends[problem[mine]])
-    more, as_they_are = _started(task, index, n)
-    problem, R = np.concatenate([problem, more]), np.concatenate([R, as_they_are])
-    functional = task.functional.take(problem)
-    bound = LIMITS.known_cost * _least(len(found), problem, cost_at_nodes(functional, R))
-    some = (_costs(found) > bound)[problem]
-    some[-len(more) :] = True
-    _follow(task, problem[some], R[some], found)
-    costly = (_costs(found) > bound)[problem]
-    if costly.any():
-        R, _ = lowered(functional.take(costly), R[costly], *LIMITS.last)
-        _follow(task, problem[costly], R, found)
-        for i in np.flatnonzero(_costs(found) > bound):
-            if isinstance(one := found[i], Solution):
-                found[i] = one._replace(beaten=True)
-
-
 def _costs(found: list[Solution | Failure]) -> Array:
     return np.array([one.cost for one in found])
 
@@ -344,11 +335,6 @@ def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
         near = np.abs(R[after:] - R[:-after]).max(axis=(1, 2, 3)) < LIMITS.same_entries
         repeated[order[after:]] |= near & (number[after:] == number[:-after])
     return repeated
-
-
-def _started(task: Task, index: Numbers, n: int) -> tuple[Numbers, Array]:
-    problem, R = task.starts(index, n)
-    return index[problem], R
 
 
 def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
