@@ -58,18 +58,20 @@ class Limits:
     more_nodes: tuple[int, int] = (33, 65)  # for fast problems, and if a start costs less
     fast: tuple[float, float] = (24.0, 80.0)  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used
     followed: float = 1.1  # Newton's method starts from curves up to this cost ratio
+    followed_of_bodies: float = 1.02  # the same for bodies; their curves have more nodes
     same_entries: float = 0.1  # starts count as equal if all entries of R differ by less than this
     known_cost: float = 1.01  # largest accepted ratio of a solution's cost to a start's cost
     one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
     flat: float = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
     bend: float = 0.5  # rad: size of the bend
-    spun: float = 1.3  # more spin is added to curves up to this cost ratio
-    spins: int = 3  # how often more spin is added
+    spun: float = 1.05  # more spin is added to curves up to this cost ratio
+    spins: int = 2  # how often more spin is added
     worth_a_turn: float = 0.3  # no spin is added if the cost is below this share of a turn's cost
-    promising: float = 1.5  # curves above this cost ratio are dropped before more steps
+    promising: float = 1.2  # curves above this cost ratio are dropped before more steps
     starts: tuple[int, float] = (40, 5e-4)
     brief: tuple[int, float] = (4, 5e-4)  # steps for new curves, before most are dropped
-    on_more_nodes: tuple[int, float] = (40, 1e-4)
+    starts_of_bodies: tuple[int, float] = (20, 2e-3)
+    on_more_nodes: tuple[int, float] = (60, 1e-4)
     bent: tuple[int, float] = (40, 1e-6)  # steps for bent curves, which may be near a saddle
     last: tuple[int, float] = (200, 0.0)  # used if the other pairs do not suffice
 
@@ -195,13 +197,14 @@ def _searched(task: Task) -> list[Solution | Failure]:
     share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # weights of w and w' in a quintic
     first = np.searchsorted(LIMITS.fast, np.linalg.norm(ends, axis=-1) @ share)[index]
     problem, R = np.zeros(0, int), np.empty((0, task.nodes, 3, 3))
-    bound, n = np.full(len(ends), np.inf), task.nodes
+    bound, of_bodies = np.full(len(ends), np.inf), isinstance(task.functional, Effort)
+    followed = LIMITS.followed_of_bodies if of_bodies else LIMITS.followed
     for level, n in enumerate((task.nodes, *LIMITS.more_nodes)):
         costly = _costs(found) > bound
         now = index[(first == level) | costly[index]]
         if len(now):
             problem, R, cost = _lowered_starts(task, now, n, problem, R)
-            likely = _promising(LIMITS.followed, len(ends), problem, R, cost)
+            likely = _promising(followed, len(ends), problem, R, cost)
             _follow(task, problem[likely], R[likely], found)
             bound[now] = LIMITS.known_cost * _least(len(ends), problem, cost)[now]
     costly = (_costs(found) > bound)[problem]
@@ -211,7 +214,7 @@ def _searched(task: Task) -> list[Solution | Failure]:
     for i in np.flatnonzero(_costs(found) > bound):
         if isinstance(one := found[i], Solution):
             found[i] = one._replace(beaten=True)
-    if isinstance(task.functional, Effort) and len(index):
+    if isinstance(task.functional, Effort):
         _leave_the_axis(task, task.functional, index, found)
     return found
 
@@ -228,7 +231,8 @@ def _lowered_starts(
     problem = np.append(index[more], problem[again])
     R = np.concatenate([starting, on_nodes(R[again], n)])
     R = with_ends(R, task.equations.ends[problem])
-    R, cost = lowered(task.functional.take(problem), R, *LIMITS.starts)
+    steps = LIMITS.starts_of_bodies if isinstance(task.functional, Effort) else LIMITS.starts
+    R, cost = lowered(task.functional.take(problem), R, *steps)
     if isinstance(task.functional, Effort):
         return _with_more_spin(task, task.functional, problem, R, cost)
     return problem, R, cost
