@@ -15,6 +15,7 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log, vee
 
+FAST = 4 * np.pi  # ‖w0‖ + ‖w1‖ above which additional full turns are tried
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
 _TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
@@ -39,6 +40,8 @@ def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp],
     number of full turns is the best one.
     """
     first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
+    speeds = np.linalg.norm([ends.w0, ends.w1, *(a / 2 for a in accelerations)], axis=-1)
+    fast = speeds.sum(axis=0) > FAST
     ahead, back = exp_so3(np.stack([first, -last]))
     C1, F = ends.R0 @ ahead, _with_free_end(ends, n, *accelerations)
     goals = C1.mT @ ends.R1 @ back, F[:, -1].mT @ ends.R1
@@ -46,8 +49,9 @@ def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp],
     t = grid(n).t[:, None]
     between = exp_so3(t * t * (3 - 2 * t) * v[:, :, None])
     over = exp_so3(t**3 * last[:, None] - (1 - t) ** 3 * first[:, None])
-    R = np.concatenate([C1[:, None] @ between[:2] @ over, F @ between[2:]])
-    return np.tile(np.arange(len(C1)), 4), R.reshape(-1, n, 3, 3)
+    R = np.concatenate([C1[:, None] @ between[:2] @ over, F @ between[2:]]).reshape(-1, n, 3, 3)
+    some = np.append([True] * (2 * len(C1)), np.tile(fast, 2))
+    return np.tile(np.arange(len(C1)), 4)[some], R[some]
 
 
 def _with_free_end(ends: Ends, n: int, *accelerations: Array) -> Array:
@@ -169,18 +173,24 @@ def _bounded(w: Array) -> Array:
     return np.clip(w, -1e6, 1e6)
 
 
-def spun(R: Array, ends: Array, G: Array) -> Array:
-    """Return the curves R with more spin about the axis of the least principal moment of G.
+def spun(
+    R: Array, ends: Array, G: Array, worth: NDArray[np.bool_]
+) -> tuple[NDArray[np.intp], Array]:
+    """Return curves R with more spin about principal axes of G, and their indices in the stack R.
 
-    With γ = 10 t³ − 15 t⁴ + 6 t⁵ and a unit vector e along the axis, the new curves are
-    R exp(φ ê) with φ = ±2π γ (a full turn) and φ = ±π (4 t (1 − t))³ (forth and back). The four
-    stacks are concatenated.
+    With γ = 10 t³ − 15 t⁴ + 6 t⁵, the new curves are R exp(φ ê) with φ = ±2π γ (a full turn), for
+    each principal axis e that is `worth` it, shape (N, 3). The axes are ordered by their moments.
+    About the first axis, the curves with φ = ±π (4 t (1 − t))³ (forth and back) are added.
     """
-    t, axis = grid(R.shape[1]).t[:, None], np.linalg.eigh(G)[1][:, None, :, 0]
-    turns = 2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2), np.pi * (4 * t * (1 - t)) ** 3
-    more = exp_so3(np.stack(turns)[:, None] * axis)
-    curves = np.concatenate([R @ more, R @ more.mT]).reshape(-1, *R.shape[1:])
-    return with_ends(curves, np.tile(ends, (4, 1, 1)))
+    t, axes = grid(R.shape[1]).t[:, None], np.linalg.eigh(G)[1].mT
+    turn, swing = 2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2), np.pi * (4 * t * (1 - t)) ** 3
+    index, axis = np.nonzero(worth)
+    again = np.flatnonzero(worth[:, 0])
+    turns = [turn * axes[index, axis][:, None], swing * axes[again, 0][:, None]]
+    more, index = exp_so3(np.concatenate(turns)), np.append(index, again)
+    index = np.tile(index, 2)
+    curves = R[index] @ np.concatenate([more, more.mT])
+    return index, with_ends(curves, ends[index])
 
 
 def with_ends(R: Array, ends: Array) -> Array:

@@ -15,7 +15,6 @@ from rbcourse.bezier import corrected_bezier_so3
 from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.collocation import (
-    NODES,
     BallStationary,
     Equations,
     Failure,
@@ -53,7 +52,7 @@ class Limits:
     """
 
     nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
-    nodes_for_bodies: int = 25  # `spun` curves have the next number of `NODES`
+    nodes_for_bodies: int = 25  # a third more are used if spin is added
     nodes_for_jerk: int = 29  # the jerk needs more, since it has higher derivatives
     more_nodes: tuple[int, int] = (33, 65)  # for fast problems, and if a start costs less
     fast: tuple[float, float] = (24.0, 80.0)  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used
@@ -64,8 +63,8 @@ class Limits:
     one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
     flat: float = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
     bend: float = 0.5  # rad: size of the bend
-    spun: float = 1.05  # more spin is added to curves up to this cost ratio
-    spins: int = 2  # how often more spin is added
+    refined: float = 3.0  # curves up to this cost ratio are lowered on more nodes
+    spun: tuple[float, ...] = (3.0, 1.05)  # more spin is added twice, up to these cost ratios
     worth_a_turn: float = 0.3  # no spin is added if the cost is below this share of a turn's cost
     promising: float = 1.2  # curves above this cost ratio are dropped before more steps
     starts: tuple[int, float] = (40, 5e-4)
@@ -248,21 +247,22 @@ def _with_more_spin(
     is added if the cheapest curve costs less than `worth_a_turn` times this cost.
     """
     ends, count = task.equations.ends, len(task.equations.ends)
-    full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)[:, 0]
-    worth = _least(count, problem, cost) > LIMITS.worth_a_turn * full_turn
+    full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)
+    worth = _least(count, problem, cost)[:, None] > LIMITS.worth_a_turn * full_turn
     if not worth[problem].any():
         return problem, R, cost
-    some = _promising(LIMITS.promising, count, problem, R, cost)
-    problem, R = problem[some], on_nodes(R[some], next(n for n in NODES if n > R.shape[1]))
+    some = _promising(LIMITS.refined, count, problem, R, cost)
+    problem, R = problem[some], on_nodes(R[some], 4 * R.shape[1] // 3)
     R, cost = lowered(effort.take(problem), with_ends(R, ends[problem]), *LIMITS.on_more_nodes)
     old = 0
-    for _ in range(LIMITS.spins):
-        some = _promising(LIMITS.spun, count, problem, R, cost) & worth[problem]
+    for ratio in LIMITS.spun:
+        some = _promising(ratio, count, problem, R, cost) & worth[problem, 0]
         some[:old] = False
         if not some.any():
             break
-        old, number = len(some), np.tile(problem[some], 4)
-        more = spun(R[some], ends[problem[some]], effort.G[problem[some]])
+        old, number = len(some), problem[some]
+        index, more = spun(R[some], ends[number], effort.G[number], worth[number])
+        number = number[index]
         more, briefly = lowered(effort.take(number), more, *LIMITS.brief)
         problem, R = np.append(problem, number), np.concatenate([R, more])
         cost = np.append(cost, briefly)
