@@ -52,7 +52,9 @@ class Limits:
     """
 
     nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
-    nodes_for_bodies: int = 25  # a third more are used if spin is added
+    nodes_for_rods: int = 25  # used if the ratio of two moments is above `rod`
+    rod: float = 3.0
+    nodes_for_spin: int = 8  # the number of nodes that are added if spin is added
     nodes_for_jerk: int = 29  # the jerk needs more, since it has higher derivatives
     more_nodes: tuple[int, int] = (33, 65)  # for fast problems, and if a start costs less
     fast: tuple[float, float] = (24.0, 80.0)  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used
@@ -91,7 +93,7 @@ class Task(NamedTuple):
     # a call with problem indices and n returns the problem of each start, and the starts at n nodes
     starts: Callable[[Numbers, int], tuple[Numbers, Array]]
     solver: Callable[[Any, Array], list[Solution | Failure]] = relax
-    nodes: int = LIMITS.nodes  # of starting curves
+    nodes: Any = LIMITS.nodes  # of starting curves, for all problems or for each one
     known: Mapping[int, Solution] = MappingProxyType({})  # solutions that are already known
 
 
@@ -139,6 +141,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     functional = Effort(G.reshape(-1, 3, 3), of_torque=of_torque)
     of_ball = dict(enumerate(cheapest(ball(given))))
     curves = {i: one for i, one in of_ball.items() if isinstance(one, Solution)}
+    moments = np.linalg.eigvalsh(functional.G)
     round_ones = np.abs(functional.G - np.eye(3)).max(axis=(1, 2)) < 8 * EPS
 
     def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
@@ -155,7 +158,9 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
         functional,
         Stationary(functional, ends.R0, ends.R1, rates),
         start,
-        nodes=LIMITS.nodes_for_bodies,
+        nodes=np.where(
+            moments[:, 2] > LIMITS.rod * moments[:, 0], LIMITS.nodes_for_rods, LIMITS.nodes
+        ),
         known={i: one for i, one in curves.items() if round_ones[i]},
     )
 
@@ -194,28 +199,45 @@ def _searched(task: Task) -> list[Solution | Failure]:
     found: list[Solution | Failure] = [task.known.get(i, NOTHING) for i in range(len(ends))]
     index = np.flatnonzero([one is NOTHING for one in found])
     share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # weights of w and w' in a quintic
-    first = np.searchsorted(LIMITS.fast, np.linalg.norm(ends, axis=-1) @ share)[index]
-    problem, R = np.zeros(0, int), np.empty((0, task.nodes, 3, 3))
-    bound, of_bodies = np.full(len(ends), np.inf), isinstance(task.functional, Effort)
-    followed = LIMITS.followed_of_bodies if of_bodies else LIMITS.followed
-    for level, n in enumerate((task.nodes, *LIMITS.more_nodes)):
-        costly = _costs(found) > bound
-        now = index[(first == level) | costly[index]]
-        if len(now):
-            problem, R, cost = _lowered_starts(task, now, n, problem, R)
-            likely = _promising(followed, len(ends), problem, R, cost)
-            _follow(task, problem[likely], R[likely], found)
-            bound[now] = LIMITS.known_cost * _least(len(ends), problem, cost)[now]
-    costly = (_costs(found) > bound)[problem]
-    if costly.any():
-        R, _ = lowered(task.functional.take(problem[costly]), R[costly], *LIMITS.last)
-        _follow(task, problem[costly], R, found)
-    for i in np.flatnonzero(_costs(found) > bound):
-        if isinstance(one := found[i], Solution):
-            found[i] = one._replace(beaten=True)
+    speed = np.linalg.norm(ends, axis=-1) @ share
+    fast, very_fast = LIMITS.fast
+    nodes = np.select(
+        [~(speed <= very_fast), ~(speed <= fast)], LIMITS.more_nodes[::-1], task.nodes
+    )
+    for n in np.unique(nodes[index]).tolist():
+        some = index[nodes[index] == n]
+        _search(task, some, n, (some[:0], np.empty((0, n, 3, 3))), found)
     if isinstance(task.functional, Effort):
         _leave_the_axis(task, task.functional, index, found)
     return found
+
+
+def _search(
+    task: Task,
+    index: Numbers,
+    n: int,
+    known: tuple[Numbers, Array],
+    found: list[Solution | Failure],
+) -> None:
+    """Search with n nodes, also from the `known` curves; then with more nodes, where this fails."""
+    problem, R, cost = _lowered_starts(task, index, n, *known)
+    of_bodies = isinstance(task.functional, Effort)
+    ratio = LIMITS.followed_of_bodies if of_bodies else LIMITS.followed
+    likely = _promising(ratio, len(found), problem, R, cost)
+    _follow(task, problem[likely], R[likely], found)
+    bound = LIMITS.known_cost * _least(len(found), problem, cost)
+    costly = index[_costs(found)[index] > bound[index]]
+    if not len(costly):
+        return
+    for more in LIMITS.more_nodes:
+        if more > n:
+            return _search(task, costly, more, (problem, R), found)
+    some = np.isin(problem, costly)
+    R, _ = lowered(task.functional.take(problem[some]), R[some], *LIMITS.last)
+    _follow(task, problem[some], R, found)
+    for i in costly[_costs(found)[costly] > bound[costly]]:
+        if isinstance(one := found[i], Solution):
+            found[i] = one._replace(beaten=True)
 
 
 def _lowered_starts(
@@ -252,7 +274,7 @@ def _with_more_spin(
     if not worth[problem].any():
         return problem, R, cost
     some = _promising(LIMITS.refined, count, problem, R, cost)
-    problem, R = problem[some], on_nodes(R[some], 4 * R.shape[1] // 3)
+    problem, R = problem[some], on_nodes(R[some], R.shape[1] + LIMITS.nodes_for_spin)
     R, cost = lowered(effort.take(problem), with_ends(R, ends[problem]), *LIMITS.on_more_nodes)
     old = 0
     for ratio in LIMITS.spun:
@@ -289,8 +311,8 @@ def _leave_the_axis(
     Such a solution may be a saddle. If all starts turn about one axis, no step leaves the axis,
     even if a curve that leaves it costs less.
     """
-    order, t = task.functional.ends // 2 + 1, grid(task.nodes).t
-    problem, bent = [], [np.empty((0, task.nodes, 3, 3))]
+    order, t = task.functional.ends // 2 + 1, grid(LIMITS.nodes).t
+    problem, bent = [], [np.empty((0, LIMITS.nodes, 3, 3))]
     for i in index:
         one = found[i]
         if isinstance(one, Solution):
@@ -299,7 +321,7 @@ def _leave_the_axis(
             if size[0] > 0 and size[1] < LIMITS.flat * size[0]:
                 sides = LIMITS.bend * _across(w / size[0], effort.G[i])[:, None]
                 turn = (4 * t * (1 - t))[:, None] ** order * sides
-                bent.append(on_nodes(one.R[None], task.nodes) @ cayley(turn))
+                bent.append(on_nodes(one.R[None], LIMITS.nodes) @ cayley(turn))
                 problem += [i] * len(sides)
     number = np.array(problem, int)
     R, cost = lowered(task.functional.take(number), np.concatenate(bent), *LIMITS.bent)
