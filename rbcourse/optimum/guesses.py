@@ -15,14 +15,14 @@ from rbcourse.optimum.collocation import cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log, vee
 
-FAST = 4 * np.pi  # ‖w0‖ + ‖w1‖ above which additional full turns are tried
+FAST = 4 * np.pi  # if ‖w0‖ + ‖w1‖ is larger, all four of the `starts` are used
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
 _TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
 
 
 def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp], Array]:
-    """Return the problem index of each starting curve, and four curves at n nodes for each problem.
+    """Return the problem index of each starting curve, and these curves at n nodes.
 
     The Bézier control points are C₁ = R0 exp(ŵ0/3) and R1 exp(−ŵ1/3). With β = 3t² − 2t³ and
     rotation vectors v from C₁ to the other control point, two curves that have the given ends are
@@ -31,7 +31,7 @@ def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp],
 
     Let F be the motion from R0 whose velocity in the fixed frame is the line from R0 w0 to R1 w1
     (or the cubic with the derivatives R0 a0 and R1 a1, if `accelerations` are given). It costs
-    least if the rotation at t = 1 is free. The other two curves are
+    least if the rotation at t = 1 is free. If the ends are fast, two more curves are
 
         R = F exp(β v̂),    v from F(1) to R1.
 

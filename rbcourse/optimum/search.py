@@ -52,8 +52,8 @@ class Limits:
     """
 
     nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
-    nodes_for_rods: int = 25  # used if the ratio of two moments is above `rod`
-    rod: float = 3.0
+    nodes_for_rods: int = 25  # with 17 nodes, 2 more of 100 rods miss their optima
+    rod: float = 3.0  # a body whose moments have a larger ratio is a rod
     nodes_for_spin: int = 8  # the number of nodes that are added if spin is added
     nodes_for_jerk: int = 29  # the jerk needs more, since it has higher derivatives
     more_nodes: tuple[int, int] = (33, 65)  # for fast problems, and if a start costs less
@@ -66,7 +66,7 @@ class Limits:
     flat: float = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
     bend: float = 0.5  # rad: size of the bend
     refined: float = 3.0  # curves up to this cost ratio are lowered on more nodes
-    spun: tuple[float, ...] = (3.0, 1.05)  # more spin is added twice, up to these cost ratios
+    spun: tuple[float, ...] = (3.0, 1.05)  # spin is added twice, to curves up to these cost ratios
     worth_a_turn: float = 0.3  # no spin is added if the cost is below this share of a turn's cost
     promising: float = 1.2  # curves above this cost ratio are dropped before more steps
     starts: tuple[int, float] = (40, 5e-4)
