@@ -69,9 +69,9 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
                 said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
                 said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
                 said += [row["remarks"]] if row["remarks"] else []
-                print(f"{name}, {student}: {'; '.join(said)}", flush=True)
                 start = {"student": student, "set": name, "boxed": "no" if why else "yes"}
                 rows[name, student] = start | row
+                print(f"{name}, {student}: {'; '.join(said)}", flush=True)
                 own = [job for job in jobs if job[0] == name]
                 if rows.keys() >= {*own}:
                     tables.append(_write_table(name, [rows[job] for job in own], assignments))

@@ -4,6 +4,7 @@ import hashlib
 import os
 from pathlib import Path
 
+COPY = "Copy the course to a folder in which you can write."
 LEAST, COUNT = 20_000, 8_000  # systems give ports above 32767 to connections
 
 
@@ -13,8 +14,7 @@ def require_writable(folder: Path) -> None:
     Windows does not tell this in advance.
     """
     if not os.access(folder, os.W_OK):
-        copy = "copy the course to a folder of your own, and run the command there"
-        raise ValueError(f"You cannot write to the folder {folder.resolve()}; {copy}.")
+        raise ValueError(f"You cannot write to the folder {folder.resolve()}.\n{COPY}")
 
 
 def port_of(folder: Path) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rbclassroom.course import options
-from rbclassroom.course.folder import require_writable
+from rbclassroom.course.folder import COPY, require_writable
 from rbclassroom.course.notebooks import copy_lessons
 from rbcourse.files import replace_file
 
@@ -72,7 +72,9 @@ def main() -> None:
         else:
             copy_lessons(Path("notebooks"), Path("work"))
         configured = configure()
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        sys.exit(f"{error}\n{COPY}")
+    except ValueError as error:
         sys.exit(str(error))
     folder = "notebooks" if known.edit else "work"
     address = f"--LabApp.default_url=/lab/tree/{folder}/00_start_here.ipynb"
