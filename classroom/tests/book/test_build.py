@@ -213,7 +213,7 @@ def test_a_build_that_fails_leaves_the_old_book(tmp_path, monkeypatch):
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)  # root may write everywhere
-    with pytest.raises(ValueError, match=rf"^You cannot write to the folder .*{tmp_path.name}; "):
+    with pytest.raises(ValueError, match=rf"^You cannot write to the folder .*{tmp_path.name}\.\n"):
         build.build(ROOT, tmp_path / "book")
     assert [*tmp_path.iterdir()] == []
 
