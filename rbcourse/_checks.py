@@ -24,11 +24,13 @@ def as_array(
     matches any size ≥ 1, repeated letters match the same size, and "n+1" matches any size ≥ 2. For
     example, ``as_array("M", M, "n", "n")`` takes a stack of square matrices. All other axes are
     batch axes; with ``stacked=False``, no batch axis is allowed. Entries may be NaN or infinite.
-    With ``copy=False``, the result may be the input. Objects with a method ``as_matrix``, such as
-    SciPy's ``Rotation`` and ``RigidTransform``, are replaced by their matrices.
+    With ``copy=False``, the result may be the input. Where square matrices are wanted, objects with
+    a method ``as_matrix``, such as SciPy's ``Rotation`` and ``RigidTransform``, are replaced by
+    their matrices.
     """
     given: Any
-    value = _matrices_of(value)
+    if not core or core[-1] in core[:-1]:  # square matrices
+        value = _matrices_of(value)
     parts: Any = value if isinstance(value, list | tuple) else [value]
     ma = sys.modules.get("numpy.ma")  # if numpy.ma is not loaded, no array is masked
     if ma and any(isinstance(part, ma.MaskedArray) for part in parts):

@@ -73,7 +73,7 @@ def write_path(
     times : array_like, shape (N,)
         Increasing times in s.
     poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses or rotation matrices, valid to 1e-9.
+        Poses or rotation matrices.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists (ω, v), or angular velocities ω, in the body frame, in rad/s and m/s.
 
@@ -156,7 +156,8 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     if (late := np.flatnonzero(times[1:] <= times[:-1])).size:
         before, after = times[late[0] :, 0][:2]
         raise ValueError(f"{lines[late[0] + 1][0]}: a time after {before} is wanted, got {after}")
-    norm = np.linalg.norm(q, axis=1)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(q, axis=1)
     if (wrong := np.abs(norm - 1) > _TOLERANCE).any():
         i = np.argmax(wrong)
         raise ValueError(

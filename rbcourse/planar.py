@@ -75,7 +75,7 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 3, 3)
-        Elements of SE(2).
+        Elements of SE(2), or matrices near them. The last row is not read.
 
     Returns
     -------

@@ -69,6 +69,7 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     Parameters
     ----------
     p, q : array_like, shape (..., 4)
+        Quaternions of any norm.
 
     Returns
     -------
@@ -92,6 +93,7 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
+        Quaternions of any norm.
 
     Returns
     -------
@@ -154,7 +156,7 @@ def project_quaternion(q: ArrayLike) -> Array:
 
 
 def canonical_quaternion(q: ArrayLike) -> Array:
-    """Return q or −q, whichever has w ≥ 0: a unique unit quaternion for each rotation.
+    """Return q or −q, whichever has w ≥ 0: a unique quaternion for each rotation.
 
     Singular set: half-turns, where ``abs(w) < 4 eps``. Then w is set to 0, and the sign is
     chosen so that the component of largest magnitude is positive. If several components have the
@@ -164,6 +166,7 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
+        Quaternions of any norm.
 
     Returns
     -------
@@ -194,7 +197,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (N, ..., 4) or (4,)
-        The first axis is time. A single quaternion is returned unchanged.
+        Quaternions of any norm; the first axis is time. A single quaternion is returned unchanged.
 
     Returns
     -------

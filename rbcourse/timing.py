@@ -90,7 +90,8 @@ def fastest(
     Parameters
     ----------
     curve : Curve
-        A single curve. Only its path is used; its times do not matter.
+        A single curve. Only its path is used; its times do not matter. For a `Timed`, this is the
+        path from which it was made.
     angular_speed, speed, angular_acceleration, acceleration : float or array_like, shape (3,)
         The largest allowed norms: of ω, of the velocity of the body's point `centre`, of ω', and of
         the acceleration of this point. Three numbers limit the magnitudes of the components in the
@@ -106,7 +107,7 @@ def fastest(
         acceleration of free fall in the fixed frame. Without such a limit, `centre` may be any
         point, such as the tip of a tool.
     rates : (float, float), optional
-        The values of s' at both ends: 0 is rest, and 1 is the velocity of the curve itself. A rate
+        The values of s' at both ends: 0 is rest, and 1 is the velocity of the path itself. A rate
         has no effect at an end where the curve rests.
 
     Returns
@@ -119,7 +120,7 @@ def fastest(
     ValueError
         If the whole path stands still, if no limit bounds the speed, if the force cannot hold the
         body at rest, or if the `rates` are out of reach. The message names the first place on the
-        path.
+        path by its s, as in `Timed`.
     MemoryError
         If the cells need more memory than the computer has.
 
@@ -131,11 +132,12 @@ def fastest(
     Notes
     -----
     The grid has 1,000 cells or, for a chain, 250 for each leg. If there are many legs, each has 25
-    cells, or as few as 4 if its velocity hardly changes. A leg in which a limit is exceeded by more
-    than 1e-4 gets twice as many cells, up to three times. T is then about 1e-3 above the shortest
-    time (4e-3 for some paths with hundreds of legs). The calculation takes about 50 ms for 1,000
-    cells, and a time and a memory in proportion for more. If it takes more than 10 s, lines on
-    stderr show its progress.
+    cells, 50 next to a stop, or as few as 4 if its velocity hardly changes. A leg in which a limit
+    is exceeded by more than 1e-4 gets twice as many cells, up to three times. T is then about 1e-3
+    above the shortest time; for some paths with many legs, it is 5e-3 above, and up to 2e-2
+    if the legs are quintics from rest to rest. The calculation takes about 50 ms for 1,000 cells,
+    and a time and a memory in proportion for more. If it takes more than 10 s, lines on stderr show
+    its progress.
 
     The result depends only on the path: neither a shift of its times nor another unit of time
     changes T. The motion stops where the path rests or its velocity jumps, and legs in which the
@@ -351,17 +353,16 @@ def _limits(
 class _Path(NamedTuple):
     """The legs of a path from the time 0 on, in a flat stack, and their ends.
 
-    The first axis of `x`, `slow` and `rest` has the length 2, for the start and the end of a leg.
+    The first axis of `x`, `fine` and `rest` has the length 2, for the start and the end of a leg.
     At a stop, `x` is the value of x: 0, the value of `rates`, or infinity if it is free, since the
     body rests. Elsewhere, it is NaN.
     """
 
     legs: Curve
-    start: float  # the time of the path that is 0 here
     knots: Array  # the ends of the legs, shape (L + 1,)
     moves: NDArray[np.bool_]  # whether the path moves in the leg, shape (L,)
     x: Array  # shape (2, L)
-    slow: NDArray[np.bool_]  # whether c' = c'' = 0, shape (2, L)
+    fine: NDArray[np.bool_]  # whether cells are smaller towards this end, shape (2, L)
     rest: NDArray[np.bool_]  # whether ω or v is 0, shape (2, L, 1 or 2)
     change: Array  # the largest change of a leg's velocity, as a share of its size, shape (L,)
 
@@ -370,7 +371,9 @@ class _Path(NamedTuple):
         L = int(np.count_nonzero(self.moves))
         most, least = max(1000 // L, min(250, 4000 // L), 25), max(1000 // L, 4)
         halvings = np.log2(_DENSE / np.clip(self.change, 1e-9, _DENSE)).astype(np.intp)
-        return np.where(self.moves, np.maximum(most >> halvings, least), 0)
+        counts = np.maximum(most >> halvings, least)
+        counts[~np.isnan(self.x).all(axis=0)] = max(most, 50)  # near a stop, the speed changes much
+        return np.where(self.moves, counts, 0)
 
 
 def _surveyed(curve: Curve, ends: Array) -> _Path:
@@ -397,10 +400,15 @@ def _surveyed(curve: Curve, ends: Array) -> _Path:
     x[0, 0], x[1, -1] = ends
     x[~np.isnan(x) & resting] = inf
     x[slow] = 0
+    fine = slow.copy()
+    fine[0, 1:] |= stop & np.logical_or.accumulate(
+        moves[:-1]
+    )  # not where the motion begins or ends
+    fine[1, :-1] |= stop & np.logical_or.accumulate(moves[:0:-1])[::-1]
     spread = np.abs(V - V[2]).max(axis=(0, 3))
     size = np.abs(V).max(axis=(0, 3))
     change = (spread / np.where(size > 0, size, 1)).max(axis=-1)
-    return _Path(legs, float(times[0]), knots, moves, x, slow, rest, change)
+    return _Path(legs, knots, moves, x, fine, rest, change)
 
 
 class _Grid:
@@ -414,8 +422,8 @@ class _Grid:
         number = np.arange(total) - np.repeat(np.cumsum(counts) - counts, counts)
         share: Array = np.stack([number, number + 1]) / counts[self.leg]
         self.first, self.last = number == 0, number + 1 == counts[self.leg]
-        slow: NDArray[np.bool_] = path.slow[:, self.leg]
-        kinds = [slow.all(axis=0), slow[0], slow[1]]  # the cells are smaller near slow stops
+        fine: NDArray[np.bool_] = path.fine[:, self.leg]
+        kinds = [fine.all(axis=0), fine[0], fine[1]]
         graded = [share**2 * (3 - 2 * share), share**2, 1 - (1 - share) ** 2]
         self.share = np.select(kinds, graded, share)
         h = path.legs.duration[self.leg]
@@ -502,8 +510,8 @@ class _Grid:
         return Timed(duration=times[-1], curve=curve, s=s, rate=rate, times=times)
 
     def place(self, cell: np.intp | int) -> float:
-        """Return the time of the path at the start of a cell."""
-        return float(self.s[cell]) + self.path.start
+        """Return s at the start of a cell."""
+        return float(self.s[cell])
 
 
 def _check_memory(cells: int) -> None:

@@ -245,8 +245,7 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     Parameters
     ----------
     times, poses : array_like, shapes (N,) and (N, 4, 4) or (N, 3, 3)
-        Two or more increasing times, and for each of them a pose or a rotation matrix, valid to
-        1e-9.
+        Two or more increasing times, and for each of them a pose or a rotation matrix.
 
     Returns
     -------

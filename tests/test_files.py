@@ -111,6 +111,7 @@ BAD_FILES = {
         (GOOD + GOOD, ", line 2: a time after 0.0 is wanted, got 0.0"),
         ("0 0 x 0 0 0 0 1\n", f", line 1, ty: {NUMBER} 'x'"),
         ("0 0 0 0 0 0 0 1.0011\n", f", line 1: {UNIT} 1.0011"),
+        ("0 0 0 0 0 0 0 1e308\n", f", line 1: {UNIT} inf"),
     ],
     "a.csv": [
         (ROW, COLUMNS),

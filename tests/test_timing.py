@@ -324,6 +324,19 @@ def test_a_short_peak_of_a_limit_is_found():
     assert when == pytest.approx(1 + 5e-5, abs=1e-6)
 
 
+@pytest.mark.parametrize("legs", [10, 100])
+def test_many_stops_cost_what_the_formula_says(legs):
+    """A chain of geodesics stops at each pose; at a low speed, it accelerates in a small cell."""
+    turns = 0.5 * np.eye(3)[np.arange(legs) % 3]
+    R = [np.eye(3)]
+    for turn in turns:
+        R.append(R[-1] @ rb.exp_so3(turn))
+    c = rb.chain(np.arange(legs + 1), R, leg=rb.geodesic_so3)
+    for speed in (0.05, 0.2, 1):
+        timed = rb.fastest(c, angular_speed=speed, angular_acceleration=2)
+        assert timed.domain[1] == pytest.approx(legs * trapezoid(0.5, speed, 2), rel=2e-3)
+
+
 @pytest.mark.parametrize("size", [3, 4])
 def test_a_timed_curve_has_exact_derivatives(size):
     c = random_chain(5)
@@ -412,6 +425,11 @@ REFUSED = [
         "force: 1.09 times the limit is needed to hold the body near s = 0",
     ),
     (UP, {"angular_acceleration": 1}, "none of them bounds the speed near s = "),
+    (
+        rb.chain([1.7e9, 1.7e9 + 1], [I4, moved(0, 0, 2)]),
+        {"force": 9, "gravity": (0, 0, -9.81)},
+        "force: 1.09 times the limit is needed to hold the body near s = 0$",
+    ),
     (rb.geodesic_se3(LINE, LINE), MOVING, "curve: the path stands still"),
     (
         rb.geodesic_so3(np.eye(3), CORNERS),
