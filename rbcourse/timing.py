@@ -380,7 +380,8 @@ def _surveyed(curve: Curve, ends: Array) -> _Path:
     """Return the legs of a path, and its stops; `ends` are the values of x at both ends."""
     legs = curve.legs.flat if isinstance(curve, Chain) else curve.flat
     times = curve.times if isinstance(curve, Chain) else np.array(curve.domain)
-    knots, h, L = times - times[0], legs.duration, legs.count
+    h, L = legs.duration, legs.count
+    # the velocity and the acceleration at five places of each leg, and their sizes in unit time
     place = np.linspace(0, 1, 5)[:, None]
     V, A = (legs.evaluate(place * h, k).reshape(5, L, -1, 3) for k in (1, 2))
     d = legs.evaluate(place[::4] * h, 0)[..., :3, 3:]
@@ -389,9 +390,11 @@ def _surveyed(curve: Curve, ends: Array) -> _Path:
     moves = (v > 1e-14 * far).any(axis=(0, 2))
     if not moves.any():
         raise ValueError("curve: the path stands still")
-    rest = (v <= 1e-12 * v.max(axis=0) + 1e-14 * far)[[0, -1]]  # up to rounding
+    # up to rounding: at ends that rest, c' = 0; at slow ends, also c'' = 0
+    rest = (v <= 1e-12 * v.max(axis=0) + 1e-14 * far)[[0, -1]]
     slow = (rest & (a <= 1e-9 * a.max(axis=0) + 1e-12 * far)[[0, -1]]).all(axis=-1)
     resting = rest.all(axis=-1)
+    # the body stops between two legs if the velocity jumps or is 0, or if one leg stands still
     jumps = np.abs(V[0, 1:] - V[-1, :-1]).max(axis=-1)
     corner = (jumps > 1e-9 * np.abs(V).max(axis=(0, 1, 3))).any(axis=-1)
     stop = corner | (resting[1, :-1] & resting[0, 1:]) | ~moves[1:] | ~moves[:-1]
@@ -400,15 +403,14 @@ def _surveyed(curve: Curve, ends: Array) -> _Path:
     x[0, 0], x[1, -1] = ends
     x[~np.isnan(x) & resting] = inf
     x[slow] = 0
+    # the cells are smaller towards stops, but not where the whole motion begins or ends
+    moved = np.logical_or.accumulate(moves[:-1])
+    moves_on = np.logical_or.accumulate(moves[:0:-1])[::-1]
     fine = slow.copy()
-    fine[0, 1:] |= stop & np.logical_or.accumulate(
-        moves[:-1]
-    )  # not where the motion begins or ends
-    fine[1, :-1] |= stop & np.logical_or.accumulate(moves[:0:-1])[::-1]
-    spread = np.abs(V - V[2]).max(axis=(0, 3))
-    size = np.abs(V).max(axis=(0, 3))
-    change = (spread / np.where(size > 0, size, 1)).max(axis=-1)
-    return _Path(legs, knots, moves, x, fine, rest, change)
+    fine[0, 1:] |= stop & moved
+    fine[1, :-1] |= stop & moves_on
+    change = np.abs(V - V[2]).max(axis=(0, 3)) / np.maximum(np.abs(V).max(axis=(0, 3)), 1e-300)
+    return _Path(legs, times - times[0], moves, x, fine, rest, change.max(axis=-1))
 
 
 class _Grid:
