@@ -326,15 +326,15 @@ class Chain(Curve):
     def evaluate(self, t: Array, order: int) -> Array:
         """Return the values at the times t, shape (T, 1), each from the leg at that time."""
         times = t[:, 0]
-        values = np.empty((len(t), 1, *self._core(order)))
         if np.any(times[1:] < times[:-1]):
+            values = np.empty((len(t), 1, *self._core(order)))
             in_order = np.argsort(times)
             values[in_order] = self.evaluate(t[in_order], order)
             return values
         own = np.searchsorted(self.times[1:-1], times, side="right")
         shares = np.minimum((times - self.times[own]) / np.diff(self.times)[own], 1)
         try:
-            values[:, 0] = evaluate_legs(self.legs, own, shares, order)
+            return evaluate_legs(self.legs, own, shares, order)[:, None]
         except SingularTime as error:
             i = error.curve
             after = error.time * self.legs.duration[i]
@@ -342,7 +342,6 @@ class Chain(Curve):
                 f"leg {i}, from {self.times[i]} to {self.times[i + 1]}, {after} after its "
                 f"start: {error.reason}"
             ) from error
-        return values
 
     def check_smooth(self, name: str, order: int) -> None:
         """Raise a RuntimeError that begins with `name` if a derivative up to `order` jumps."""
