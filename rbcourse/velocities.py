@@ -237,10 +237,10 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     """Return velocities from parabolas; each parabola joins a pose to its two neighbours.
 
     A change of one pose affects only the velocities at this pose and at its neighbours. But the
-    acceleration jumps at the poses. For random poses, the median excess of the cost over the
-    optimum is 12 %, however small the steps are. The `spline_velocities` have neither drawback. If
-    the poses are samples of a smooth motion, doubling their number divides the excess over the
-    optimum (with the same end velocities) by 4.
+    acceleration jumps at the poses. For random rotations at equally spaced times, the median excess
+    of the cost over the optimum is 14 to 15 %, however small the steps are. The `spline_velocities`
+    have neither drawback. If the poses are samples of a smooth motion, doubling their number
+    divides the excess over the optimum (with the same end velocities) by 4.
 
     Parameters
     ----------
