@@ -52,7 +52,7 @@ TASKS = {  # the environment, commands and purpose of each task; the last comman
     "grade": ("teach", ["rbclassroom.assignments grade"], "grade collected submissions: grade ps1"),
     "test": ("test", [PYTEST], "run all tests, or the tests in PATHS"),
     "releases": ("test", ["rbclassroom.course.releases"], "test with oldest or newest releases"),
-    "figures": ("lessons", ["rbclassroom.explorers.recorded"], "draw all figures again"),
+    "figures": ("lessons", ["rbclassroom.course.figures"], "draw all figures again"),
     "ledger": ("test", ["rbclassroom.course.ledger"], "write docs/ledger.md"),
     "atlas": ("lessons", ["rbclassroom.surveys.body_atlas"], "compute the atlas of real bodies"),
     "bench": ("test", ["benchmarks"], "compare times with other packages"),

@@ -4,7 +4,7 @@ The second comparison covers files, the form of the outputs, and cells whose out
 
 All uses of nbval's internals are in this file. nbval gives an item for each cell, a kernel, and the
 comparison of text. To replace it, collect one item for each lesson that runs it with
-`rbclassroom.course.notebooks.execute`, and does then what `Remains.runtest` does: `changed_lines`
+`rbclassroom.course.figures.execute`, and does then what `Remains.runtest` does: `changed_lines`
 compares everything that a lesson stores.
 """
 

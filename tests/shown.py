@@ -123,7 +123,13 @@ def numbers_of(artists):
 
 
 def check_looks(fig):
-    """Fail if a figure is clipped, has axes without labels, or has curves that look the same."""
+    """Fail if a figure is clipped, has axes without labels, has curves that look the same, or has
+    illegible letters on a slide of 1080 pixels: 13.5 points must be at least 2.5 % of its height.
+    """
+    width, height = fig.get_size_inches()
+    aspect = width / height
+    room = min(1744, 755 * aspect) if aspect > 1.85 else min(1210, 880 * aspect)
+    assert 13.5 / 72 * room / width >= 26
     flat = [ax for ax in fig.axes if ax.name == "rectilinear"]
     box = fig.get_tightbbox().transformed(fig.dpi_scale_trans)
     assert (box.min > -1).all(), box

@@ -4,10 +4,12 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
 from packages import find_program
+from sweeps import made
 
 from rbclassroom.assignments import sandbox
 from rbclassroom.course.lab import configure
@@ -21,11 +23,6 @@ def sandbox_for(named):
     if named:
         find_program("bubblewrap", "bwrap")
     return sandbox.missing()
-
-
-def npm_for(named):
-    """Return why the JupyterHub is not tested, or ""."""
-    return "" if named else "it installs a JupyterHub with npm; to run it, name this folder"
 
 
 def pages_for(named):
@@ -48,6 +45,26 @@ def pages_for(named):
     return ""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def few_states(request):
+    """Let pages have explorers with few states, which are recorded in less than a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.path.parent.name in ("book", "lecture"):
+            from rbclassroom.explorers import recorded
+
+            patch.setattr(recorded, "living", recorded_briefly)
+        yield
+
+
+@cache
+def recorded_briefly(name):
+    from rbclassroom.explorers import recorded
+
+    explorer = made(name)
+    explorer.restart()
+    return recorded.record(explorer, f"{name}_explorer", {}, stride=40)._repr_html_()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session):
     """Prepare these tests before the workers start; a folder that is named is never left out."""
@@ -56,7 +73,7 @@ def pytest_sessionstart(session):
     if hasattr(config, "workerinput") or config.option.collectonly:
         return
     paths = [here / word.partition("::")[0] for word in config.args]
-    for name, prepare in (("hostile", sandbox_for), ("browser", pages_for), ("hub", npm_for)):
+    for name, prepare in (("hostile", sandbox_for), ("browser", pages_for)):
         folder = HERE / name
         named = any(folder in (path, *path.parents) for path in paths)
         inside = any(path in folder.parents for path in paths)

@@ -92,20 +92,22 @@ def save_animation(
     frames: int,
     seconds: float = 4.0,
     still: int = -1,
+    *,
+    pdf: bool = False,
 ) -> Animation:
-    """Save an animation as GIF, its still frame as PNG and PDF, and its numbers as CSV.
+    """Save an animation as GIF, its still frame as PNG, and its numbers as CSV.
 
-    The files go to the folder of `save_figure`. The same input always gives the same bytes. The
-    figure is closed.
+    The files go to the folder of `save_figure`. The same input always gives the same bytes. With
+    `pdf`, the still frame is also saved as PDF. The figure is closed.
     """
     table = csv_text(data)
     animation = animate(fig, name, alt, update, frames, seconds, still)
     pictures = {"png": animation.shown}
     if animation.pictures:
         pictures["gif"] = gif(animation.pictures, seconds)
-    write_figure(fig, name, table, pictures)
+    write_figure(fig, name, table, pictures, pdf)
     plt.close(fig)
-    return replace(animation, caption=caption(alt, f"{name}.gif, .png, .pdf, .csv"))
+    return replace(animation, caption=caption(alt, f"{name}.gif, .png{', .pdf' * pdf}, .csv"))
 
 
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:

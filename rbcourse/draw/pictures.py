@@ -59,7 +59,7 @@ def png(picture: Image.Image) -> bytes:
     return content.getvalue()
 
 
-def pdf(fig: Figure) -> bytes:
+def as_pdf(fig: Figure) -> bytes:
     """Return a figure as a PDF, with the same bytes wherever Python and the fonts are.
 
     Matplotlib sorts the fonts in a PDF by their paths, which depend on the folders of Python and of

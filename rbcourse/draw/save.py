@@ -23,7 +23,7 @@ from PIL import Image
 
 import rbcourse as rb
 from rbcourse.draw.display import Display, Player
-from rbcourse.draw.pictures import data_url, drawn, pdf, png
+from rbcourse.draw.pictures import as_pdf, data_url, drawn, png
 from rbcourse.draw.space import scenes
 from rbcourse.files import replace_file
 
@@ -70,6 +70,8 @@ class Picture:
         The name of the figure's files without the extension.
     alt : str
         The alternative text, which describes the figure.
+    caption : str
+        The first sentence of the description, and the names of the files, as HTML.
     png : bytes
         The picture. Its resolution is higher than displayed, so that it is sharp on fine and large
         screens.
@@ -79,6 +81,7 @@ class Picture:
 
     name: str
     alt: str
+    caption: str
     png: bytes
     width: int
 
@@ -89,7 +92,7 @@ class Picture:
         return (
             f'<figure><img width="{self.width}" style="max-width: 100%" '
             f'alt="{html.escape(self.alt)}" src="{data_url(self.png)}"/>'
-            f"{caption(self.alt, f'{self.name}.png, .pdf, .csv')}</figure>"
+            f"{self.caption}</figure>"
         )
 
 
@@ -106,33 +109,36 @@ def caption(alt: str, files: str = "") -> str:
     return f"<figcaption>{html.escape(sentence, quote=False)}{small}</figcaption>"
 
 
-def save_figure(fig: Figure, name: str, data: Table, alt: str) -> Picture | Player:
-    """Save a figure as PNG, PDF and CSV, close it, and return it for the notebook to show.
+def save_figure(
+    fig: Figure, name: str, data: Table, alt: str, *, pdf: bool = False
+) -> Picture | Player:
+    """Save a figure as PNG and CSV, close it, and return it for the notebook to show.
 
     Artists in a `Space` can be turned in the notebook; the files show the initial view. The
     environment variable ``RBCOURSE_FIGURES`` names the folder of the files; the default is
     ``figures`` in the current folder. If the variable is empty, no files are written. The same
     input always gives the same bytes. With 256 colours, the PNG is a third as large, without a
-    visible difference.
+    visible difference. With `pdf`, the figure is also saved as PDF, for printing.
     """
     table, content = csv_text(data), io.BytesIO()
     if fig.get_layout_engine() is None:  # savefig would leave the figure with that of the style
         fig.set_layout_engine(PlaceHolderLayoutEngine(True, True))
     fig.savefig(content, format="png")
     picture = png(Image.open(content))
-    write_figure(fig, name, table, {"png": picture})
-    shown = _turning(fig, name, alt) if scenes(fig) else None
+    write_figure(fig, name, table, {"png": picture}, pdf)
+    text = caption(alt, f"{name}.png{', .pdf' * pdf}, .csv")
+    shown = _turning(fig, name, alt, text) if scenes(fig) else None
     plt.close(fig)
-    return shown or Picture(name, alt, picture, round(SHOWN * fig.get_figwidth()))
+    return shown or Picture(name, alt, text, picture, round(SHOWN * fig.get_figwidth()))
 
 
-def _turning(fig: Figure, name: str, alt: str) -> Player:
+def _turning(fig: Figure, name: str, alt: str, text: str) -> Player:
     fig.set_layout_engine("none")  # keeps all artists in place
     fig.set_dpi(min(SHOWN, 1500 // fig.get_size_inches().max()))
-    display, files = Display(fig), caption(alt, f"{name}.png, .pdf, .csv")
+    display = Display(fig)
     still = drawn(fig, [], [], zoom=1.25)  # for readers without scripts
     background, states = drawn(fig, [], None), [display.record([])]
-    return Player(name, alt, files, still, background, display, states, controls=())
+    return Player(name, alt, text, still, background, display, states, controls=())
 
 
 def save_table(name: str, data: Table) -> None:
@@ -142,13 +148,17 @@ def save_table(name: str, data: Table) -> None:
         replace_file(folder / f"{name}.csv", table.encode())
 
 
-def write_figure(fig: Figure, name: str, table: str, pictures: Mapping[str, bytes]) -> None:
-    """Write the CSV, the PDF and the pictures of a figure; the keys of `pictures` are endings.
+def write_figure(
+    fig: Figure, name: str, table: str, pictures: Mapping[str, bytes], pdf: bool
+) -> None:
+    """Write the CSV, the pictures and, with `pdf`, the PDF of a figure.
 
-    All contents are made before the first file is written.
+    The keys of `pictures` are endings. All contents are made before the first file is written.
     """
     if folder := figures_folder():
-        files = {"csv": table.encode(), "pdf": pdf(fig), **pictures}
+        files = {"csv": table.encode(), **pictures}
+        if pdf:
+            files["pdf"] = as_pdf(fig)
         for ending, content in files.items():
             replace_file(folder / f"{name}.{ending}", content)
 

@@ -19,6 +19,7 @@ from matplotlib.cbook import contiguous_regions
 from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.path import Path
+from matplotlib.textpath import text_to_path
 from matplotlib.projections import register_projection
 from matplotlib.transforms import Affine2D, IdentityTransform
 from mpl_toolkits.mplot3d import Axes3D
@@ -178,6 +179,7 @@ class Looks(RendererBase):
 
     def __init__(self, renderer: Any, letters: bool) -> None:
         super().__init__()
+        self._text2path = text_to_path  # shared: it parses each formula once, not in each frame
         self.renderer, self.letters = renderer, letters
         self.found: list[tuple[GraphicsContextBase, Any, tuple[Path, ...]]] = []
 

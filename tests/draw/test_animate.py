@@ -160,7 +160,7 @@ def test_the_player_starts_with_the_still_frame(still, count):
 
 def test_animation_files_have_the_same_bytes_each_time(saved):
     (player, files), (other, again) = saved
-    assert set(files) == {"cube.gif", "cube.png", "cube.pdf", "cube.csv"}
+    assert set(files) == {"cube.gif", "cube.png", "cube.csv"}
     assert files == again
     assert player._repr_html_() == other._repr_html_()
     assert files["cube.png"] == player.shown
@@ -179,7 +179,7 @@ def test_the_player_is_complete(saved):
     assert 'alt="a &quot;cube&quot;"' in page
     # one picture for the still, and one for the fixed artists
     assert page.count("data:image/png;base64,") == 2
-    assert '>a "cube" <small>cube.gif, .png, .pdf, .csv</small></figcaption>' in page
+    assert '>a "cube" <small>cube.gif, .png, .csv</small></figcaption>' in page
     data = held(page)
     shares = data["controls"][0]["values"]
     assert (data["milliseconds"], len(shares), shares[0], shares[-1]) == (250, 12, "0 %", "100 %")

@@ -23,7 +23,7 @@ def test_saved_files_have_the_same_bytes_each_time(tmp_path, monkeypatch):
         monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path / folder))
         fig, ax = plt.subplots()
         ax.plot(*TABLE.values())
-        picture = save.save_figure(fig, "line", TABLE, "a line")
+        picture = save.save_figure(fig, "line", TABLE, "a line", pdf=True)
     files, again = ({f.name: f.read_bytes() for f in (tmp_path / x).iterdir()} for x in "ab")
     assert set(files) == {"line.png", "line.pdf", "line.csv"}
     assert files == again
@@ -39,7 +39,7 @@ def test_the_files_of_a_figure_are_written_completely_or_not_at_all(tmp_path, mo
     def draw(name, table):
         fig, ax = plt.subplots(figsize=(1, 1))
         (line,) = ax.plot(*table.values())
-        animate.save_animation(fig, name, table, "a line", lambda _: [line], 2)
+        animate.save_animation(fig, name, table, "a line", lambda _: [line], 2, pdf=True)
 
     draw("line", TABLE)
     changed = {key: [0, *column] for key, column in TABLE.items()}
@@ -70,7 +70,7 @@ for path in moved.values():
 plt.style.use(["default", "rbcourse.rbcourse"])
 fig, ax = plt.subplots()
 ax.set(xlabel="time", ylabel="$\\theta$")
-save_figure(fig, "line", {}, "a line")
+save_figure(fig, "line", {}, "a line", pdf=True)
 """
 
 
@@ -152,8 +152,8 @@ def test_figures_are_saved_beside_the_notebook_by_default(tmp_path, monkeypatch)
     ],
 )
 def test_the_caption_has_the_first_sentence_of_the_description(alt, sentence):
-    picture = save.Picture("line", alt, b"", 100)
-    page, files = picture._repr_html_(), "line.png, .pdf, .csv"
+    picture = save.Picture("line", alt, save.caption(alt, "line.png, .csv"), b"", 100)
+    page, files = picture._repr_html_(), "line.png, .csv"
     assert repr(picture) == f"line: {alt}"
     assert f'alt="{html.escape(alt)}"' in page
     assert page.endswith(f"<figcaption>{sentence} <small>{files}</small></figcaption></figure>")

@@ -27,7 +27,8 @@ from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
 from rbclassroom.book.serve import serve
 from rbclassroom.course import ledger, options
 from rbclassroom.course.folder import require_writable
-from rbclassroom.course.notebooks import lesson_paths, living
+from rbclassroom.course.notebooks import lesson_paths
+from rbclassroom.explorers import recorded
 from rbclassroom.lecture.deck import write as write_decks
 from rbclassroom.lecture.slides import deck_of
 from rbclassroom.live import engine, pages
@@ -178,8 +179,7 @@ class Sources:
             code, up = reference.coloured(self.read(path)), "../" * (path.count("/") + 1)
             page = self.rendered("code.html.j2", path=path, up=up, code=code)
             write(self.extra / "code" / path.replace(".py", ".html"), page)
-        explorers = shutil.ignore_patterns("explorers")
-        shutil.copytree(self.root / "figures", self.extra / "figures", ignore=explorers)
+        shutil.copytree(self.root / "figures", self.extra / "figures")
         files = {path.name for path in (self.root / "figures").iterdir()}
         found = ledger.collect(self.root)
         self.shown |= {"modules": modules, "found": found, "files": files}
@@ -223,7 +223,7 @@ class Sources:
 
     def put_fronts(self) -> None:
         """Write the pages that have a template: the start page, the lists and the instructions."""
-        cube = living("cube", self.root).replace("<figure>", '<figure class="hero">', 1)
+        cube = recorded.living("cube").replace("<figure>", '<figure class="hero">', 1)
         where = self.extra / "lessons", "lessons/pictures"
         self.put("scene.html", lessons.with_script_files(cube, *where))
         for path in (HERE / "pages").rglob("*.md"):
@@ -260,6 +260,7 @@ def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = N
     require_writable(book.parent)
     if book.exists() and not (book / MADE).exists():
         raise ValueError(f"{book} is not a book made by this command; move it away or delete it")
+    recorded.record_all()
     with tempfile.TemporaryDirectory(dir=book.parent, prefix=".book-") as folder:
         sources, extra, pages = (Path(folder, name) for name in ("sources", "extra", "pages"))
         print("Reading the lessons ...", flush=True)

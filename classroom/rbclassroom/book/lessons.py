@@ -21,7 +21,8 @@ from PIL import Image
 from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.places import relinked, with_keys
 from rbclassroom.book.polls import voted
-from rbclassroom.course.notebooks import lesson_paths, living, split_sheet
+from rbclassroom.course.notebooks import lesson_paths, split_sheet
+from rbclassroom.explorers import recorded
 from rbcourse.draw.display import ENGINE
 from rbcourse.draw.save import caption
 
@@ -268,7 +269,7 @@ def prepared(
             output.data for output in cell.outputs if "text/html" in output.get("data", {})
         ):
             if explorer:
-                shown["text/html"] = living(explorer[1], root)
+                shown["text/html"] = recorded.living(explorer[1])
             shown["text/html"] = with_files(with_picture_files(shown["text/html"], known, folder))
             shown["text/html"] = with_script_files(shown["text/html"], folder)
     voted(cells)

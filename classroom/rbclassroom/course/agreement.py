@@ -2,8 +2,8 @@
 
 Results agree under the following conditions. Texts have the same bytes. Numbers in a table differ
 by at most 1e-12 of the largest number in their column, or by 2 units of their eleventh digit. In a
-picture, at most 1 pixel in 10,000 differs visibly, and at most 12 in a square of 16 × 16. A
-browser draws a living picture from whole numbers. Two living pictures agree if they have the same
+picture, at most 1 pixel in 10,000 differs visibly, and at most 12 in a square of 16 × 16. PDF and
+GIF files only have to be readable, because they are drawn like the PNG beside them. A browser draws a living picture from whole numbers. Two living pictures agree if they have the same
 polygons in the same styles, and no coordinate differs by more than one unit, 1/8 of a pixel.
 """
 
@@ -15,6 +15,7 @@ import json
 import re
 import zlib
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -154,44 +155,39 @@ def stale_figures(drawn: Path, stored: Path) -> list[str]:
 
 
 def _is_stored(file: Path, folder: Path) -> bool:
-    kept = folder / file.name
-    same = {".png": look_the_same, ".gif": look_the_same, ".csv": same_tables}
     try:
-        if file.read_bytes() == kept.read_bytes():
-            return True
-        if file.suffix == ".pdf":  # a PDF may differ only if its PNG or CSV file differs
-            pairs = ([path.with_suffix(end) for path in (file, kept)] for end in (".png", ".csv"))
-            return any(one.read_bytes() != other.read_bytes() for one, other in pairs)
-        return file.suffix in same and same[file.suffix](file.read_bytes(), kept.read_bytes())
+        drawn, kept = file.read_bytes(), (folder / file.name).read_bytes()
+        if file.suffix == ".csv":
+            return same_tables(drawn, kept)
+        if file.suffix == ".png":
+            return look_the_same(drawn, kept)
+        return all(map(_is_readable, (drawn, kept)))
     except (OSError, ValueError):  # the stored file is missing or damaged
         return False
 
 
+def _is_readable(content: bytes) -> bool:
+    """Tell whether this is a complete PDF, or a picture whose frames can all be decoded."""
+    if content.startswith(b"%PDF-"):
+        return content.rstrip().endswith(b"%%EOF")
+    with Image.open(io.BytesIO(content)) as picture:
+        return all(frame.convert("RGB") for frame in ImageSequence.Iterator(picture))
+
+
+@lru_cache  # a figure is compared in its file and in its notebook
 def look_the_same(one: bytes, other: bytes) -> bool:
-    """Tell whether two pictures, or all frames of two GIFs, agree up to rounding.
+    """Tell whether two pictures agree up to rounding.
 
     A pixel differs visibly if a colour differs by more than 16 of 255 levels. At most 1 pixel in
     10,000 may differ visibly, and at most 12 in a square of 16 × 16; a different letter changes
-    about thirty pixels. The mean difference has to be below 0.05 levels. Frames have the same
-    durations.
+    about thirty pixels. The mean difference has to be below 0.05 levels.
     """
     if one == other:
         return True
-    (times, frames), (times_2, frames_2) = (zip(*_frames(x), strict=True) for x in (one, other))
-    return times == times_2 and all(map(_hardly_differ, frames, frames_2))
-
-
-def _frames(content: bytes) -> Iterator[tuple[Any, NDArray[np.uint8]]]:
-    with Image.open(io.BytesIO(content)) as picture:
-        mode = "RGB" if picture.format == "GIF" else "RGBA"
-        for frame in ImageSequence.Iterator(picture):
-            yield frame.info.get("duration"), np.asarray(frame.convert(mode))
-
-
-def _hardly_differ(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> bool:
-    if one.shape != other.shape:
+    first, second = (np.asarray(Image.open(io.BytesIO(x)).convert("RGBA")) for x in (one, other))
+    if first.shape != second.shape:
         return False
-    difference = np.abs(one.astype(int) - other)
+    difference = np.abs(first.astype(int) - second)
     visibly = difference.max(axis=-1) > 16
     in_squares = np.pad(visibly.astype(int), 15)
     for axis in (0, 1) if visibly.any() else ():

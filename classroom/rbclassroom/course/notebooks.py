@@ -1,25 +1,20 @@
-"""Execute and store the lessons reproducibly."""
+"""The stored lessons, and their copies for readers."""
 
 import hashlib
 import json
 import os
 import platform
 import re
-import tempfile
-import time
-from collections.abc import Sequence
 from contextlib import closing
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 import nbformat
-from nbclient import NotebookClient
 from nbformat import NotebookNode
 from nbformat.sign import NotebookNotary
 from tornado.web import HTTPError
 
-from rbclassroom.course.agreement import reconciled_notebook, stale_figures
 from rbcourse.files import replace_file
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
@@ -51,36 +46,6 @@ def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
             sheet = "\n\n".join(other.source for other in notebook.cells[i:])
             return notebook.cells[:i], sheet.removeprefix(SHEET).strip()
     return notebook.cells, ""
-
-
-def living(name: str, root: Path) -> str:
-    """Return the HTML of an explorer that moves without Python."""
-    page = (root / "figures" / "explorers" / f"{name}.html").read_text(encoding="utf-8")
-    return page[page.index("<figure>") : page.index("</html>")]
-
-
-def execute(path: Path, figures: Path) -> str:
-    """Run a lesson from top to bottom in a new kernel, and return the text of the notebook."""
-    notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(
-        notebook,
-        kernel_name=KERNEL["name"],
-        record_timing=False,
-        coalesce_streams=True,
-        store_widget_state=False,
-        timeout=600,
-        iopub_timeout=600,
-        raise_on_iopub_timeout=True,
-        extra_arguments=["--log-level=ERROR"],
-        resources={"metadata": {"path": str(path.parent)}},
-    )
-    kernel = client.create_kernel_manager()
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        for name, value in kernel_address(folder).items():
-            setattr(kernel, name, value)
-        own = {"RBCOURSE_FIGURES": str(figures.resolve()), "IPYTHONDIR": folder}
-        client.execute(env={**os.environ, **own})
-    return normalised(notebook)
 
 
 def kernel_address(folder: str) -> dict[str, str]:
@@ -162,43 +127,6 @@ def _with_numbered_ids(ran: list[Any]) -> list[Any]:
         json.dumps(ran),
     )
     return [nbformat.from_dict(part) for part in json.loads(text)]
-
-
-def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
-    """Execute lessons, then rewrite the stored outputs and figures that have changed.
-
-    By default all lessons run; `names` limits the run to lessons whose names begin with one of
-    these words. Results that agree up to rounding are not rewritten. If a lesson
-    fails, no file is rewritten. If all lessons run, figures that none of them draws are removed.
-    """
-    every = lesson_paths(lessons)
-    if not every:
-        raise ValueError(f"{lessons} has no lessons; run this in the folder of the course")
-    if unknown := [name for name in names if not any(p.stem.startswith(name) for p in every)]:
-        raise ValueError(f"names: prefixes of lessons' names are wanted, got {unknown[0]!r}")
-    chosen = [path for path in every if not names or path.stem.startswith(tuple(names))]
-    with tempfile.TemporaryDirectory() as folder:
-        texts = {}
-        for path in chosen:
-            print(f"{path.stem} ...", end=" ", flush=True)
-            start = time.perf_counter()
-            text = execute(path, Path(folder))
-            texts[path] = reconciled_notebook(path.read_text("utf-8"), text)
-            print(f"{time.perf_counter() - start:.1f} s", flush=True)
-        drawn = sorted(Path(folder).iterdir())
-        stale = {Path(name).stem for name in stale_figures(Path(folder), figures)}
-        changed = [path for path, text in texts.items() if path.read_text("utf-8") != text]
-        for path in changed:
-            replace_file(path, texts[path].encode())
-        figures.mkdir(exist_ok=True)
-        for file in drawn:
-            if file.stem in stale:  # replace all files of a figure together
-                replace_file(figures / file.name, file.read_bytes())
-        if chosen == every:
-            for file in {file for file in figures.iterdir() if file.is_file()}:
-                if file.name not in {each.name for each in drawn}:
-                    file.unlink()
-    print(f"{len(texts)} lessons run, {len(changed)} changed; figures changed: {len(stale)}")
 
 
 def copy_lessons(lessons: Path, work: Path) -> None:

@@ -1,34 +1,25 @@
 """Explorers for pages without Python, with recorded states of some controls."""
 
+import hashlib
 import html
-import sys
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
-from string import Template
 from typing import Any
 
+import matplotlib
+import pooch
+
+import rbcourse
 from rbclassroom import explorers
-from rbclassroom.course import options
-from rbclassroom.course.agreement import reconciled
-from rbclassroom.course.notebooks import regenerate
 from rbclassroom.explorers.explorer import Explorer, numbers
 from rbclassroom.explorers.paths import JOINED
 from rbcourse.draw.display import Player
 from rbcourse.draw.save import FORMS
 from rbcourse.files import replace_file
-
-_PAGE = Template("""\
-<!doctype html>
-<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>$title</title>
-<style>
-  :root { color-scheme: light dark; font: 1rem sans-serif; }
-  figure { margin: 0; }
-  @media (prefers-color-scheme: dark) { img, canvas { filter: invert(0.93) hue-rotate(180deg); } }
-</style>
-$figure</html>
-""")
 
 _ABOUT = "This is a recording. In the lesson, with Python, you can move every control in all steps."
 MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
@@ -54,6 +45,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "timing": ({"angular_speed": [0.5, 1, 2], "acceleration": [0.5, 1, 2, 4, 6]}, 4),
 }
 """The recorded values of controls of each explorer, and the stride of the control that plays."""
+_SLOWEST_FIRST = sorted(MOVED, key=["rotation", "projection", "spline"].__contains__, reverse=True)
 
 
 def record(
@@ -108,30 +100,39 @@ def _text(value: Any) -> str:
     return value if isinstance(value, str) else numbers(value, 2).rstrip("0").rstrip(".")
 
 
-def write_pages(folder: Path) -> None:
-    """Write a page for each explorer to a folder."""
-    folder.mkdir(exist_ok=True)
-    for name, moved in MOVED.items():
-        print(f"{name} ...", flush=True)
+def living(name: str) -> str:
+    """Return the HTML of an explorer that moves without Python; it is recorded only once."""
+    file = _stored(name)
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
         explorer = getattr(explorers, f"{name}_explorer")()
-        figure = record(explorer, f"{name}_explorer", *moved)._repr_html_()
-        page = _PAGE.substitute(title=html.escape(explorer.name), figure=figure)
-        file = folder / f"{name}.html"
-        if file.exists():
-            page = reconciled(file.read_text("utf-8"), page)
-        replace_file(file, page.encode())
+        figure = record(explorer, f"{name}_explorer", *MOVED[name])._repr_html_()
+        replace_file(file, figure.encode())
+    return file.read_text("utf-8")
 
 
-def main() -> None:
-    """Run lessons and explorers again, in the folder of the course, and store the changes."""
-    lessons = options.parse("figures")[0].lessons
-    try:
-        regenerate(Path("notebooks"), Path("figures"), lessons)
-    except (OSError, ValueError) as error:
-        sys.exit(str(error))
-    if not lessons:
-        write_pages(Path("figures", "explorers"))
+def record_all() -> None:
+    """Record the explorers that are not yet recorded, in as many processes as processors."""
+    missing = [name for name in _SLOWEST_FIRST if not _stored(name).exists()]
+    if missing:
+        print(f"Recording {len(missing)} explorers, for pages without Python ...", flush=True)
+        # a new process has no threads of the server or of the tests that call this function
+        with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+            for _ in pool.map(living, missing):
+                print(".", end="", flush=True)
+        print(flush=True)
 
 
-if __name__ == "__main__":
-    main()
+def _stored(name: str) -> Path:
+    return pooch.os_cache("rbcourse") / "explorers" / f"{name}-{_version()}.html"
+
+
+@cache
+def _version() -> str:
+    """Return a digest of all code and styles on which a recorded explorer depends."""
+    digest = hashlib.sha256(matplotlib.__version__.encode())
+    for folder in (Path(rbcourse.__file__).parent, Path(explorers.__file__).parent):
+        for path in sorted(folder.rglob("*.*")):
+            if path.suffix in (".py", ".js", ".mplstyle", ".ttf"):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -14,7 +14,8 @@ import nbformat
 from nbformat import NotebookNode
 from PIL import Image
 
-from rbclassroom.course.notebooks import living, split_sheet
+from rbclassroom.course.notebooks import split_sheet
+from rbclassroom.explorers import recorded
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections whose slides come after the last slide; the key E leads to them."""
@@ -167,7 +168,7 @@ def picture_of(cell: NotebookNode, root: Path) -> tuple[str, float]:
     """Return the picture of a code cell, interactive if possible, and its width over its height."""
     page = "".join(o.get("data", {}).get("text/html", "") for o in cell.get("outputs", []))
     if explorer := re.search(r"explorers\.(\w+)_explorer\(\)", cell.source):
-        page = living(explorer[1], root)  # a recorded explorer moves without Python
+        page = recorded.living(explorer[1])  # moves without Python
     image = re.search(r'<img [^>]*?alt="([^"]*)"[^>]*?src="(data:image/png;base64,([^"]+))"', page)
     if not image:
         raise ValueError(f"slide: {cell.id} has no picture; 'course.py figures' stores it")

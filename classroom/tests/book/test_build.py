@@ -55,7 +55,6 @@ def test_the_sources_of_the_book_are_complete(written):
     assert {f"{name}.html" for name in MOVED} <= extra
     assert "lessons/14_take_it_away.html" in extra
     assert {f"lessons/{path.name}" for path in LESSONS} <= extra
-    assert "figures/explorers" not in extra
 
 
 def test_problem_sets_have_no_solutions(source):

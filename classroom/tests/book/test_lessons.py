@@ -10,7 +10,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from PIL import Image
 
 from rbclassroom.book import lessons
-from rbclassroom.course.notebooks import living
+from rbclassroom.explorers import recorded
 
 
 def markdown(*texts):
@@ -53,8 +53,7 @@ def test_pictures_become_files(tmp_path):
 
 
 def test_interactive_pictures_share_their_scripts(tmp_path):
-    root = Path(__file__).parents[3]
-    cube, arm = (living(name, root) for name in ("cube", "arm"))
+    cube, arm = (recorded.living(name) for name in ("cube", "arm"))
     found = lessons.with_script_files(cube + arm + cube, tmp_path, "there")
     sources = re.findall(r'<script src="there/([^"]+)"></script>', found)
     assert len(sources) == 6

@@ -39,7 +39,7 @@ def home(tmp_path_factory):
     kept = ("PATH", "SYSTEMROOT", "LANG")
     env = {name: os.environ[name] for name in kept if name in os.environ}
     env |= {"HOME": str(home), "USERPROFILE": str(home), "PYTHONPATH": os.pathsep.join(PACKAGES)}
-    for folder in ("notebooks", "benchmarks", "figures/explorers"):
+    for folder in ("notebooks", "benchmarks"):
         shutil.copytree(ROOT / folder, home / "course" / folder)
     code = "from rbclassroom.course.notebooks import Path, copy_lessons\n"
     code += "copy_lessons(Path('notebooks'), Path('work'))"

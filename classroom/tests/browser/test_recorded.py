@@ -3,7 +3,6 @@
 import html
 import io
 import re
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,8 +14,12 @@ from rbclassroom import explorers
 from rbclassroom.explorers import recorded
 from rbcourse.draw import animate
 
-FOLDER = Path(__file__).parents[3] / "figures" / "explorers"
 HOUR = 3_600_000  # ms
+
+
+def show(page, name):
+    """Show a recorded explorer alone on a page."""
+    page.set_content(f"<!doctype html>{recorded.living(name)}")
 
 
 @plt.style.context(["default", "rbcourse.rbcourse"])
@@ -64,7 +67,7 @@ def test_a_player_shows_the_drawing(timed):
 @pytest.mark.parametrize("name", ["planar", "chain", "random", "minimum_acceleration", "cube"])
 def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
     timed.set_viewport_size({"width": 1400, "height": 1000})
-    timed.goto((FOLDER / f"{name}.html").as_uri())
+    show(timed, name)
     explorer, (moved, stride) = getattr(explorers, f"{name}_explorer")(), recorded.MOVED[name]
     steps = explorer.steps[explorer.time.index % stride :: stride]
     canvas, sliders = timed.locator("canvas"), timed.locator("input").all()
@@ -115,7 +118,7 @@ def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
 
 def test_players_show_few_steps_if_the_user_asks_for_less_motion(timed):
     timed.emulate_media(reduced_motion="reduce")
-    timed.goto((FOLDER / "theta.html").as_uri())
+    show(timed, "theta")
     timed.locator("input").last.fill("0")
     timed.clock.pause_at(HOUR)
     timed.get_by_role("button", name="play or pause").click()
@@ -125,11 +128,10 @@ def test_players_show_few_steps_if_the_user_asks_for_less_motion(timed):
 
 
 def test_a_page_without_scripts_shows_a_still_picture(context):
-    file = FOLDER / "theta.html"
     plain = context.browser.new_context(java_script_enabled=False)
     page = plain.new_page()
-    page.goto(file.as_uri())
-    alt = html.unescape(re.search(r'alt="([^"]*)"', file.read_text(encoding="utf-8"))[1])
+    show(page, "theta")
+    alt = html.unescape(re.search(r'alt="([^"]*)"', recorded.living("theta"))[1])
     assert page.get_by_role("img", name=alt, exact=True).is_visible()
     page.get_by_text("About this picture").click()
     assert page.get_by_text("with Python, you can move every control").is_visible()

@@ -15,6 +15,7 @@ from servers import serving
 
 from rbclassroom.lecture.deck import write
 from rbclassroom.lecture.slides import deck_of
+from rbcourse.draw.save import SHOWN
 
 ROOT = Path(__file__).parents[3]
 SLIDES = ROOT / "book" / "slides"
@@ -30,15 +31,15 @@ HERE = "() => Reveal.getCurrentSlide().innerText"
 
 
 def saved_inches():
-    """Return the width of each saved figure in inches, by its description."""
+    """Return the width of each still figure in inches, by its description."""
     found = {}
     for path in LESSONS:
         for cell in nbformat.read(path, as_version=4).cells:
             for output in cell.get("outputs", []):
-                name, _, alt = output.get("data", {}).get("text/plain", "").partition(": ")
-                if (file := ROOT / "figures" / f"{name}.pdf").is_file():
-                    box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) ", file.read_bytes())
-                    found[alt] = float(box[1]) / 72
+                data = output.get("data", {})
+                _, _, alt = data.get("text/plain", "").partition(": ")
+                if width := re.search(r'<figure><img width="(\d+)"', data.get("text/html", "")):
+                    found[alt] = int(width[1]) / SHOWN
     return found
 
 

@@ -1,5 +1,6 @@
 """Test the modules that run, store and copy lessons."""
 
+import asyncio
 import os
 import runpy
 from functools import partial
@@ -16,6 +17,7 @@ from nbformat.sign import NotebookNotary, SQLiteSignatureStore
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 from tornado.web import HTTPError
 
+from rbclassroom.course import figures as drawing
 from rbclassroom.course import notebooks
 
 
@@ -25,14 +27,14 @@ def notebook_at(path, *sources):
     return path
 
 
-def test_the_kernel_that_runs_a_lesson_opens_no_port(tmp_path):
+def test_the_kernel_that_runs_a_lesson01_opens_no_port(tmp_path):
     sources = [
         "print('one', flush=True)\nprint('two')",
         "import ipykernel, json\nprint(json.loads(ipykernel.get_connection_info())['transport'])",
         "object()",
     ]
     path = notebook_at(tmp_path / "01_all.ipynb", *sources)
-    cells = nbformat.reads(notebooks.execute(path, tmp_path), as_version=4).cells
+    cells = nbformat.reads(asyncio.run(drawing.execute(path, tmp_path)), as_version=4).cells
     assert [cell.source for cell in cells] == sources
     assert [output.text for output in cells[0].outputs] == ["one\ntwo\n"]
     assert cells[1].outputs[0].text == ("tcp\n" if os.name == "nt" else "ipc\n")
@@ -40,7 +42,7 @@ def test_the_kernel_that_runs_a_lesson_opens_no_port(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kernels listen at ports on Windows")
-def test_the_kernel_that_tests_a_lesson_opens_no_port(monkeypatch, request):
+def test_the_kernel_that_tests_a_lesson01_opens_no_port(monkeypatch, request):
     monkeypatch.setattr(nbval.kernel, "KernelManager", KernelManager)
     conftest = Path(__file__).parents[3] / "notebooks/conftest.py"
     runpy.run_path(str(conftest))["pytest_configure"](request.config)
@@ -71,11 +73,11 @@ def test_differences_between_runs_and_machines_are_not_stored():
 def test_nothing_is_removed_from_a_folder_without_lessons(tmp_path):
     (tmp_path / "thesis.pdf").touch()
     with pytest.raises(ValueError, match="has no lessons; run this"):
-        notebooks.regenerate(tmp_path, tmp_path)
+        drawing.regenerate(tmp_path, tmp_path)
     assert (tmp_path / "thesis.pdf").exists()
 
 
-def test_nothing_is_rewritten_if_a_lesson_fails(tmp_path):
+def test_nothing_is_rewritten_if_a_lesson01_fails(tmp_path):
     good = "import os, pathlib\npathlib.Path(os.environ['RBCOURSE_FIGURES'], 'new.png').touch()"
     paths = [
         notebook_at(tmp_path / "01_good.ipynb", good),
@@ -85,52 +87,52 @@ def test_nothing_is_rewritten_if_a_lesson_fails(tmp_path):
     figures.mkdir()
     (figures / "old.png").touch()
     with pytest.raises(CellExecutionError, match="ZeroDivisionError"):
-        notebooks.regenerate(tmp_path, figures)
+        drawing.regenerate(tmp_path, figures)
     assert [path.read_text() for path in paths] == before
     assert [file.name for file in figures.iterdir()] == ["old.png"]
 
 
-def test_storing_one_lesson_changes_no_other_file(tmp_path, monkeypatch):
-    def execute(path, figures):
+def test_storing_one_lesson01_changes_no_other_file(tmp_path, monkeypatch):
+    async def execute(path, figures):
         """Save a figure named after the lesson; return the lesson with a new source."""
         name = path.stem[3:]
-        (figures / f"{name}.png").write_text(name)
+        (figures / f"lesson01_{name}.png").write_text(name)
         return nbformat.writes(new_notebook(cells=[new_code_cell(name, id="cell-0")])) + "\n"
 
-    monkeypatch.setattr(notebooks, "execute", execute)
+    monkeypatch.setattr(drawing, "execute", execute)
     figures = tmp_path / "figures"
     figures.mkdir()
-    for file in ("arm.png", "old.png", "plane.png"):  # the last file is damaged
-        (figures / file).write_text("as it was")
+    was = {f"lesson01_{name}.png": "as it was" for name in ("arm", "old", "plane")} | {
+        "my.png": "mine"
+    }
+    for file, text in was.items():
+        (figures / file).write_text(text)
     paths = [notebook_at(tmp_path / f"{name}.ipynb", "1") for name in ("01_plane", "02_arm")]
     before = paths[1].read_text()
-    notebooks.regenerate(tmp_path, figures, ["01"])
+    drawing.regenerate(tmp_path, figures, ["01"])
     assert '"plane"' in paths[0].read_text()
     assert paths[1].read_text() == before
-    assert {file.name: file.read_text() for file in figures.iterdir()} == {
-        "arm.png": "as it was",
-        "old.png": "as it was",
-        "plane.png": "plane",
-    }
-    notebooks.regenerate(tmp_path, figures)
+    now = {file.name: file.read_text() for file in figures.iterdir()}
+    assert now == was | {"lesson01_plane.png": "plane"}
+    drawing.regenerate(tmp_path, figures)
     assert '"arm"' in paths[1].read_text()
-    assert {file.name for file in figures.iterdir()} == {"arm.png", "plane.png"}
+    assert {file.name for file in figures.iterdir()} == was.keys() - {"lesson01_old.png"}
     with pytest.raises(ValueError, match="prefixes of lessons' names are wanted, got '03'"):
-        notebooks.regenerate(tmp_path, figures, ["03"])
+        drawing.regenerate(tmp_path, figures, ["03"])
 
 
 def test_lessons_and_figures_are_stored_completely_or_not_at_all(tmp_path, monkeypatch):
-    def execute(path, figures):
+    async def execute(path, figures):
         (figures / "plane.png").write_text("another picture")
         return nbformat.writes(new_notebook(cells=[new_code_cell("2", id="cell-0")])) + "\n"
 
-    monkeypatch.setattr(notebooks, "execute", execute)
+    monkeypatch.setattr(drawing, "execute", execute)
     lessons, figures = tmp_path / "course" / "notebooks", tmp_path / "course" / "figures"
     for folder in (lessons, figures):
         folder.mkdir(parents=True)
     notebook_at(lessons / "01_plane.ipynb", "1")
     (figures / "plane.png").write_text("a picture")
-    write = partial(notebooks.regenerate, lessons, figures)
+    write = partial(drawing.regenerate, lessons, figures)
     check_all_or_nothing(write, lessons.parent)
     check_all_or_nothing(write, figures)
 
@@ -210,7 +212,7 @@ def test_a_copy_that_was_edited_is_never_changed(folders, capsys, there, work):
     assert "your copy is kept, the new one is 01_plane_2.ipynb" in capsys.readouterr().out
 
 
-def test_a_lesson_that_is_not_a_notebook_is_reported(folders, monkeypatch):
+def test_a_lesson01_that_is_not_a_notebook_is_reported(folders, monkeypatch):
     closed, close = [], SQLiteSignatureStore.close
     monkeypatch.setattr(SQLiteSignatureStore, "close", lambda s: closed.append(close(s)))
     (folders[0] / "02_arm.ipynb").write_text("<<<<<<< HEAD")

@@ -2,6 +2,7 @@
 
 import base64
 import codecs
+import contextlib
 import html
 import os
 import re
@@ -218,8 +219,8 @@ def course(tmp_path_factory, template):
     course = Class(tmp_path_factory.mktemp("course"), template)
     asked = []
     server, local = socket.create_server(("127.0.0.1", 0)), socket.socket(socket.AF_UNIX)
-    os.chdir(course.folder)
-    local.bind("sock")
+    with contextlib.chdir(course.folder):  # the path of a socket must be short
+        local.bind("sock")
     local.listen()
     for ear in (server, local):
         threading.Thread(target=lambda ear=ear: asked.append(ear.accept()), daemon=True).start()
