@@ -51,13 +51,8 @@ TASKS = {  # the environment, commands and purpose of each task; the last comman
     "collect": ("teach", ["rbclassroom.assignments collect"], "sort LMS downloads: collect FOLDER"),
     "grade": ("teach", ["rbclassroom.assignments grade"], "grade collected submissions: grade ps1"),
     "test": ("test", [PYTEST], "run all tests, or the tests in PATHS"),
-    "releases": ("test", ["rbclassroom.course.releases"], "test with oldest or newest releases"),
     "figures": ("lessons", ["rbclassroom.course.figures"], "draw all figures again"),
-    "ledger": ("test", ["rbclassroom.course.ledger"], "write docs/ledger.md"),
-    "atlas": ("lessons", ["rbclassroom.surveys.body_atlas"], "compute the atlas of real bodies"),
-    "bench": ("test", ["benchmarks"], "compare times with other packages"),
     "lint": ("test", ["ruff check", "ruff format --check", "mypy"], "check style and types"),
-    "lock": ("test", ["rbclassroom.course.lock"], "write the lists of exact versions"),
 }
 PATHS = "check", "collect", "test"  # tasks with paths, relative to the terminal's folder
 
@@ -82,7 +77,7 @@ def main():
     if task in PATHS and Path.cwd() != ROOT:
         words = [from_here(word) for word in words]
     set_up(environment)
-    if task in ("test", "releases", "figures"):
+    if task in ("test", "figures"):
         # matrices are small; on a busy machine, two threads take four times as long as one
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         # with this variable, each process would compile all modules again

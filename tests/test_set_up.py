@@ -180,7 +180,6 @@ def test_each_task_passes_its_arguments_to_its_modules(task, done, tmp_path, mon
         "collect": ["ps1.ipynb", "--due", "2026-12-01"],
         "grade": ["ps1.ipynb"],
         "test": ["ps1.ipynb::Cell 1", "-k", "so3"],
-        "releases": ["oldest", "-k", "so3"],
         "figures": ["03", "04"],
     }.get(task, [])
     monkeypatch.setattr(course, "run", lambda *given: ran.append(given))
@@ -197,7 +196,7 @@ def test_each_task_passes_its_arguments_to_its_modules(task, done, tmp_path, mon
     assert [words[0] for words in ran] == [command.split()[0] for command in commands]
     for name, *_ in ran:
         assert find_spec(name), name
-    alone = task in ("test", "releases", "figures")
+    alone = task in ("test", "figures")
     assert os.environ.pop("OPENBLAS_NUM_THREADS", "") == "1" * alone
     assert ("PYTHONDONTWRITEBYTECODE" in os.environ) is not alone
 
@@ -453,12 +452,10 @@ def test_tests_are_left_out_if_their_program_is_missing(prepare):
     left_out, ignored = prepare("classroom", "tests")
     assert left_out["hostile"] == "no sandbox"
     assert "Chromium is not found" in left_out["browser"]
-    assert "npm" in left_out["hub"]
     assert ignored == [str(ROOT / "classroom" / "tests" / name) for name in left_out]
     assert prepare("tests", "classroom/tests/book/test_build.py") == ({}, [])
-    assert [*prepare("classroom", ignore=["classroom/tests/browser"])[0]] == ["hostile", "hub"]
+    assert [*prepare("classroom", ignore=["classroom/tests/browser"])[0]] == ["hostile"]
     assert "only if it is named" in prepare("classroom", keyword="so3")[0]["hostile"]
-    assert prepare("classroom/tests/hub") == ({}, [])
     with pytest.raises(pytest.UsageError, match="no sandbox"):
         prepare("classroom/tests/hostile/test_box.py::test_box")
     with pytest.raises(pytest.UsageError, match="Chromium is not found"):

@@ -19,8 +19,8 @@ from matplotlib.cbook import contiguous_regions
 from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.path import Path
-from matplotlib.textpath import text_to_path
 from matplotlib.projections import register_projection
+from matplotlib.textpath import text_to_path
 from matplotlib.transforms import Affine2D, IdentityTransform
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3D, Text3D

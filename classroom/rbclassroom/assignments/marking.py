@@ -41,14 +41,15 @@ class Problem:
     inputs: Sequence[Sequence[Any]]  # the arguments of each trial
     answers: Sequence[Any]  # the right result of each trial
     mistakes: Sequence[Mistake] = ()
-    allowed: Sequence[str] = ()  # the student may use these names of the package
+    own: str = ""  # the functions that an answer may use
     accuracy: float = 1e-9
     angles: Sequence[int] = ()
 
     def accepts(self, function: Callable[..., Any]) -> bool:
         """Compare a function with the answer on all inputs."""
         self._examine(function)
-        print("The function is correct on these inputs. Grading tries others.")
+        said = "The function is correct on these inputs. Grading tries others."
+        print(f"{said} {self.own}".rstrip())
         return True
 
     def on(self, inputs: Sequence[Sequence[Any]], answers: Sequence[Any]) -> Self:
@@ -93,7 +94,7 @@ class Problem:
 
     def _run(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
         arguments = tuple(copy.deepcopy(trial))
-        (result,) = call_student(function, arguments, self.allowed)
+        (result,) = call_student(function, arguments)
         if not _unchanged(tuple(trial), arguments):
             raise NotYet("Your function changes its arguments. Work on a copy.")
         return result
@@ -143,7 +144,7 @@ class Drawing(Problem):
         return curves_of(self._draw(function, trial))
 
     def _draw(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
-        return draw(lambda *given: call_student(function, given, self.allowed), trial)
+        return draw(lambda *given: call_student(function, given), trial)
 
     def _describe(self, called: str, got: Any, wanted: Any) -> str:
         if not got:

@@ -33,13 +33,13 @@ class Sampler:
     fault: Callable[[Array], str]  # returns a hint if a stacked draw is invalid, else ""
     uniforms: Callable[[Array], Rows]  # returns named rows of numbers from stacked draws
     mistakes: Sequence[Mistake]
-    allowed: Sequence[str] = ()  # as in `Problem`
+    own: str = ""  # as in `Problem`
     draws: int = 20_000
 
     def accepts(self, function: Callable[..., Any], rng: Rng = None) -> bool:
         """Call a sampler many times, and compare its distributions with the right ones."""
         rng = np.random.default_rng(rng)
-        drawn = self._as_draws(call_student(function, (rng,), self.allowed, self.draws))
+        drawn = self._as_draws(call_student(function, (rng,), self.draws))
         if (drawn[:10] == drawn[0]).all():
             raise NotYet(
                 "Every call returns the same draw. Does your function make, and seed, a new "
@@ -51,7 +51,8 @@ class Sampler:
         gaps = {name: _gap(row) for name, row in rows.items()}
         worst = max(gaps, key=lambda name: gaps[name] / self._bound(rows, name))
         if gaps[worst] <= self._bound(rows, worst):
-            print(f"The {self.draws} draws agree with the distribution that is wanted.")
+            said = f"The {self.draws} draws agree with the distribution that is wanted."
+            print(f"{said} {self.own}".rstrip())
             return True
         raise NotYet(
             self._hint(rows)

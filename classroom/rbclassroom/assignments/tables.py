@@ -3,7 +3,8 @@
 The table of the set ``NAME`` is the file ``NAME.toml`` beside its folder. Students do not get the
 table. It has a section ``SLUG`` for the problem with the cells ``SLUG-answer`` and ``SLUG-test``. A
 section has the inputs and common mistakes. Each mistake has a hint, and the bodies of functions
-that make the mistake. The right answers come from the notebook.
+that make the mistake. The right answers come from the notebook. `own` says which functions an
+answer may use; students see it when an answer is right, and nothing checks it.
 """
 
 import copy
@@ -59,17 +60,17 @@ def evaluate(folder: Path) -> dict[str, dict[str, Any]]:
     space: dict[str, Any] = {"__name__": "__main__"}
     for text in (cells.get("setup", ""), *answers, table.pop("helpers", "")):
         exec(compile(text, folder.name, "exec"), space)
-    found = {}
+    found, own = {}, table.pop("own", "")
     for slug, problem in table.items():
         try:
-            found[slug] = _evaluate(problem, cells[f"{slug}-answer"], space)
+            found[slug] = {"own": own, **_evaluate(problem, cells[f"{slug}-answer"], space)}
         except Exception as error:
             raise ValueError(f"{folder.name}.toml, {slug}: {error!r}") from error
     return found
 
 
 def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> dict[str, Any]:
-    kept = "law", "allowed", "accuracy", "angles"
+    kept = "law", "accuracy", "angles"
     known: dict[str, Any] = {key: problem[key] for key in kept if key in problem}
     inputs = eval(problem.get("inputs", "[]"), space)
     names = list(inspect.signature(space[_name(answer)]).parameters)

@@ -3,8 +3,9 @@
 Results agree under the following conditions. Texts have the same bytes. Numbers in a table differ
 by at most 1e-12 of the largest number in their column, or by 2 units of their eleventh digit. In a
 picture, at most 1 pixel in 10,000 differs visibly, and at most 12 in a square of 16 × 16. PDF and
-GIF files only have to be readable, because they are drawn like the PNG beside them. A browser draws a living picture from whole numbers. Two living pictures agree if they have the same
-polygons in the same styles, and no coordinate differs by more than one unit, 1/8 of a pixel.
+GIF files only have to be readable, because they are drawn like the PNG beside them. A browser draws
+a living picture from whole numbers. Two living pictures agree if they have the same polygons in the
+same styles, and no coordinate differs by more than one unit, 1/8 of a pixel.
 """
 
 import base64

@@ -32,8 +32,9 @@ _HEAD = """\
 # Ledger
 
 This page lists the modules and lessons for each equation, proposition, remark and figure of the two
-texts, and the misprints in our copies of the texts. `python3 course.py ledger` writes the page; do
-not edit it. The ledger of the book, which `python3 course.py book` makes, also links functions,
+texts, and the misprints in our copies of the texts. `python -m rbclassroom.course.ledger` writes
+the page; do not edit it. The ledger of the book, which `python3 course.py book` makes, also links
+functions,
 tests, sections and pictures."""
 _MISPRINTS = """\
 ## Misprints

@@ -1,11 +1,14 @@
-"""Write the lists of exact versions that course.py installs."""
+"""Write the lists of exact versions that course.py installs, from the ranges in pyproject.toml.
+
+``python -m rbclassroom.course.lock`` keeps the present versions if possible; with ``--upgrade``, it
+takes the newest ones.
+"""
 
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from rbclassroom.course import options
 from rbcourse.files import replace_file
 
 COURSE = "-e .[draw]\n-e ./classroom[lessons]\n"
@@ -16,7 +19,7 @@ LISTS = {  # what each list adds to the lists before it
     "tests/environment-test.txt": "-e .[test,lint]\n-e ./classroom[browser]\n",
 }
 SLOW = "jsonschema<4.25\n"  # later releases need 1.5 s more for their import
-HEAD = "# Exact versions, for every system and Python; written by 'course.py lock'.\n"
+HEAD = "# Exact versions, for every system and Python; written by rbclassroom.course.lock.\n"
 
 
 def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
@@ -33,9 +36,8 @@ def compiled(wanted: str, preferred: str, *words: str) -> list[str]:
 
 def main() -> None:
     """Write all lists into the folder of the course, which is the current one."""
-    upgrade = ["--upgrade"] * options.parse("lock")[0].upgrade
     now = "".join(Path(name).read_text("utf-8") for name in LISTS if Path(name).exists())
-    now = "\n".join(compiled("".join(LISTS.values()), now, *upgrade))
+    now = "\n".join(compiled("".join(LISTS.values()), now, *sys.argv[1:]))
     wanted, there = "", set[str]()
     for name, more in LISTS.items():
         wanted += more

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
-FURTHER = {"lab": "JupyterLab", "test": "pytest", "releases": "pytest"}
+FURTHER = {"lab": "JupyterLab", "test": "pytest"}
 """The tasks that pass arguments which they do not know to another program."""
 
 
@@ -55,13 +55,9 @@ def parser(task: str, purpose: str = "") -> argparse.ArgumentParser:
         add("--without-box", action="store_true", help=risk)
     elif task == "test":
         add("paths", nargs="*", metavar="PATH", help="files or folders; by default all tests")
-    elif task == "releases":
-        add("which", choices=["oldest", "newest"])
     elif task == "figures":
-        lessons = "the number of a lesson, such as 03; by default all lessons and the explorers"
+        lessons = "the number of a lesson, such as 03; by default all lessons"
         add("lessons", nargs="*", metavar="LESSON", help=lessons)
-    elif task == "lock":
-        add("--upgrade", action="store_true", help="take the newest versions")
     return made
 
 

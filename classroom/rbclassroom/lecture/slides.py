@@ -1,7 +1,7 @@
 """A stored lesson as slides: the metadata `slide` of a cell is the text that the class sees.
 
 A cell without this metadata makes no slide; its text goes to the notes of the previous slide.
-CONTRIBUTING.md has the rules for authors.
+docs/authoring.md has the rules for authors.
 """
 
 import base64

@@ -3,7 +3,6 @@
 import base64
 import io
 import re
-from pathlib import Path
 
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output

@@ -6,7 +6,6 @@ import json
 import re
 import zlib
 from functools import cache, partial
-from pathlib import Path
 
 import nbformat
 import numpy as np
