@@ -11,7 +11,6 @@ import tomllib
 import warnings
 from pathlib import Path
 from textwrap import dedent
-from types import SimpleNamespace
 from zipfile import ZipFile
 
 import pytest
