@@ -1,12 +1,13 @@
-"""A stored lesson as slides: the metadata `slide` of a cell is the text that the class sees.
+"""A stored lesson as slides: ``notebooks/slides/06.md`` has the texts that the class sees.
 
-A cell without this metadata makes no slide; its text goes to the notes of the previous slide.
+A cell without such a text makes no slide; its own text goes to the notes of the previous slide.
 docs/authoring.md has the rules for authors.
 """
 
 import base64
 import io
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -63,8 +64,8 @@ class Deck:
 
 
 class _Reader:
-    def __init__(self, root: Path) -> None:
-        self.root = root
+    def __init__(self, root: Path, texts: dict[str, str]) -> None:
+        self.root, self.texts = root, texts
         self.section = ""
         self.shown, self.behind = list[Slide](), list[Slide]()
         self.ahead = list[str]()  # notes for the next slide
@@ -109,9 +110,7 @@ class _Reader:
 
     def read(self, cell: NotebookNode) -> None:
         """Add the slides of a cell, and its notes."""
-        wish = cell.metadata.get("slide", "")
-        if not isinstance(wish, str):
-            raise ValueError(f"slide: a text is wanted in {cell.id}, got {wish!r}")
+        wish = self.texts.get(cell.id, "")
         self.names[cell.id.replace("-", " ")] = len(self.shown)
         if cell.cell_type == "markdown":
             self.read_text(cell.source, wish)
@@ -221,13 +220,37 @@ def plan(slides: list[Slide], names: dict[str, int], sheet: str) -> str:
     return sheet.replace("| minute |", "| minute | slide |").replace("\n|---", "\n|---|---")
 
 
+def texts_of(path: Path, names: Collection[str]) -> dict[str, str]:
+    """Return the texts in a file by the cells that they belong to; `names` are those of the lesson.
+
+    A line such as ``## cell-04`` begins the text of a cell.
+    """
+    texts, name = dict[str, str](), ""
+    for number, line in enumerate(path.read_text(encoding="utf-8-sig").split("\n"), 1):
+        where = f"slides/{path.name}, line {number}"
+        if line.startswith("## "):
+            name = line[3:].strip()
+            if name not in names:
+                raise ValueError(f"{where}: the lesson has no cell {name!r}")
+            if name in texts:
+                raise ValueError(f"{where}: cell {name} has a text above")
+            texts[name] = ""
+        elif name:
+            texts[name] += f"{line}\n"
+        elif line.strip():
+            raise ValueError(f"{where}: a line such as '## cell-04' is wanted before the text")
+    return {name: text.strip() for name, text in texts.items()}
+
+
 def deck_of(path: Path) -> Deck:
     """Return the slides of a lesson in the folder ``notebooks`` of a course."""
     try:
         cells, sheet = split_sheet(nbformat.read(path, as_version=4))
         if not cells or not cells[0].source.startswith("# "):
             raise ValueError("it does not begin with a title, such as # The plane")
-        reader = _Reader(path.resolve().parents[1])
+        file = path.parent / "slides" / f"{path.name[:2]}.md"
+        texts = texts_of(file, [cell.id for cell in cells]) if file.exists() else {}
+        reader = _Reader(path.resolve().parents[1], texts)
         for cell in cells:
             reader.read(cell)
         title = reader.shown[0]

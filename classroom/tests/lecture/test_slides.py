@@ -16,7 +16,7 @@ pytest.importorskip("markdown_it", reason="slides are made in the environment of
 
 from rbclassroom.lecture import deck as pages
 from rbclassroom.lecture import slides
-from rbclassroom.lecture.slides import deck_of
+from rbclassroom.lecture.slides import deck_of, texts_of
 
 ROOT = Path(__file__).parents[3]
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
@@ -24,35 +24,37 @@ SHEET = "## Run sheet for the lecturer\n\n*Before class:* Sleep.\n\n"
 SHEET += "| minute | part | ask | skip |\n|---|---|---|---|\n"
 
 
-def text(source, slide=None, **more):
-    metadata = {} if slide is None else {"slide": slide}
-    return new_markdown_cell(source, metadata={**metadata, **more})
+def text(source, slide=None):
+    """Return a cell of text, and its text on slides."""
+    return new_markdown_cell(source), slide
 
 
 def picture(name, slide=None, size=(400, 300), **more):
-    """Return a code cell with a black picture; its white margins are a tenth of its size."""
+    """Return a code cell with a black picture, whose white margins are a tenth of its size."""
     still = Image.new("L", size, 255)
     still.paste(0, (size[0] // 10, size[1] // 10, size[0] * 9 // 10, size[1] * 9 // 10))
     file = io.BytesIO()
     still.save(file, "PNG")
     src = f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
     data = {"text/html": f'<figure><img id="x" alt="described" src="{src}"/></figure>'}
-    metadata = {} if slide is None else {"slide": slide}
     outputs = [new_output("display_data", data)]
     source = f'save_figure(fig, "lesson01_{name}", data, alt)'
-    return new_code_cell(source, metadata=metadata, outputs=outputs, **more)
+    return new_code_cell(source, outputs=outputs, **more), slide
 
 
 def tiny(folder, *cells, sheet=""):
     """Return the deck of a lesson that has a title and these cells."""
-    cells = [
+    pairs = [
         text("# Tiny: a lesson\n\nGoals.", "Why?"),
         *cells,
         *([text(SHEET + sheet)] if sheet else []),
     ]
-    (folder / "notebooks").mkdir(exist_ok=True)
+    (folder / "notebooks" / "slides").mkdir(parents=True, exist_ok=True)
     path = folder / "notebooks" / "01_tiny.ipynb"
-    path.write_text(nbformat.writes(new_notebook(cells=cells)), encoding="utf-8")
+    notebook = new_notebook(cells=[cell for cell, _ in pairs])
+    path.write_text(nbformat.writes(notebook), encoding="utf-8")
+    texts = "\n".join(f"## {cell.id}\n\n{slide}\n" for cell, slide in pairs if slide)
+    (path.parent / "slides" / "01.md").write_text(texts, encoding="utf-8")
     return deck_of(path)
 
 
@@ -87,12 +89,23 @@ def test_slides_show_only_the_text_written_for_them(tmp_path):
     assert '<div class="fragment"><p>Then.</p>' in page
     assert "<li>all of it</li>" in page
     with pytest.raises(ValueError, match="does not begin with a title"):
-        deck_of(lesson_at(tmp_path / "untitled", text("Text.")))
-    for wrong in (True, False, 3, {"text": "x"}, None):
-        cell = text("x")
-        cell.metadata["slide"] = wrong
-        with pytest.raises(ValueError, match=r"01_tiny\.ipynb: slide: a text is wanted"):
-            tiny(tmp_path, cell)
+        deck_of(lesson_at(tmp_path / "untitled", new_markdown_cell("Text.")))
+
+
+@pytest.mark.parametrize(
+    ("texts", "wrong"),
+    [
+        ("## one\n\nText.\n\n## tow\n", "5: the lesson has no cell 'tow'"),
+        ("## one\n\n## two\n## one\n", "4: cell one has a text above"),
+        ("\nText.\n", "2: a line such as '## cell-04' is wanted before the text"),
+    ],
+)
+def test_a_text_without_a_cell_is_refused(tmp_path, texts, wrong):
+    path = lesson_at(tmp_path, *(new_markdown_cell("# It", id=name) for name in ("one", "two")))
+    (path.parent / "slides").mkdir()
+    (path.parent / "slides" / "01.md").write_text(texts, encoding="utf-8")
+    with pytest.raises(ValueError, match=re.escape(f"01_tiny.ipynb: slides/01.md, line {wrong}")):
+        deck_of(path)
 
 
 def test_a_picture_is_shown_with_the_text_of_its_cell(tmp_path):
@@ -120,7 +133,7 @@ def test_a_picture_is_shown_with_the_text_of_its_cell(tmp_path):
         with pytest.raises(ValueError, match=r"^01_tiny\.ipynb: .*nowhere"):
             tiny(tmp_path, text("## 1", f"![]({missing})"))
     with pytest.raises(ValueError, match=r"no picture; 'course\.py figures' stores it"):
-        tiny(tmp_path, new_code_cell("1", metadata={"slide": "Text."}))
+        tiny(tmp_path, (new_code_cell("1"), "Text."))
 
 
 VERDICT = """**B** It is even.
@@ -237,7 +250,7 @@ def test_a_question_about_a_poll_is_asked_after_the_vote(tmp_path):
     ]
     assert asked == [[], [], *[["Why B?"]] * 3, ["And so?"]]
     cells = poll()
-    cells[3].id = "proof"  # the row of the poll has only the slide of the poll
+    cells[3][0].id = "proof"  # the row of the poll has only the slide of the poll
     deck = tiny(tmp_path, *cells, sheet="| 0 | poll 1 | Why B? | |\n| 5 | proof | | |\n")
     assert "**Ask:** Why B?" in deck.shown[1].notes
 
@@ -302,7 +315,7 @@ def letters_of(sketch):
 
 
 def test_each_sketch_has_a_description_and_a_slide():
-    texts = [path.read_text(encoding="utf-8") for path in LESSONS]
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "notebooks/slides").glob("*.md")]
     sketches = sorted(slides.SKETCHES.glob("*.svg"))
     assert sketches
     for path in sketches:
@@ -315,7 +328,9 @@ def test_each_sketch_has_a_description_and_a_slide():
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
 def test_every_number_and_formula_on_a_slide_is_in_its_section(path):
     sections, now = [], []
-    for cell in nbformat.read(path, as_version=4).cells:
+    lesson = nbformat.read(path, as_version=4).cells
+    texts = texts_of(path.parent / "slides" / f"{path.name[:2]}.md", [cell.id for cell in lesson])
+    for cell in lesson:
         if re.match(r"## ", cell.source):
             now = []
         if not now:
@@ -327,7 +342,7 @@ def test_every_number_and_formula_on_a_slide_is_in_its_section(path):
         source = "\n".join(cell.source for cell in cells) + printed
         known = plain(source)
         for cell in cells:
-            slide = cell.metadata.get("slide") or ""
+            slide = texts.get(cell.id, "")
             lettering = "".join(map(letters_of, re.findall(r"!\[\]\(sketches/(\w+)\)", slide)))
             slide = re.sub(r"!\[\]\([^)]*\)", "", slide)
             formulas = re.findall(r"\$\$?([^$]+)\$\$?", slide)
