@@ -82,7 +82,7 @@ def section(slide: Slide) -> str:
     """Return a slide as HTML for reveal.js."""
     layout, words, head = slide.kind, _words(slide), f"<h2>{_inline(slide.title)}</h2>"
     picture, text = slide.picture, "".join(slide.parts)
-    short = len(text) < 290 and "$$" not in text and "|-" not in text
+    short = len(text) < (290 if picture else 420) and "$$" not in text and "|-" not in text
     if slide.kind in ("title", "end") and '"controls":[]' not in picture:
         picture = picture.partition("<script")[0]  # sliders would need much room
     if slide.kind == "title":
@@ -98,6 +98,8 @@ def section(slide: Slide) -> str:
         layout = "wide" if slide.aspect > WIDE else "split"
     elif "<h3>" not in words:  # the slide is a recap, or comes after the end
         head, words = "<h2></h2>", f"<h3>{_inline(slide.title)}</h3>{words}"
+    elif slide.kind == "plain":
+        layout = "plain" + " short" * short
     if heading := re.match(r"\s*<h3>.*?</h3>", words):
         head, words = head + heading[0], words[heading.end() :]
     layout += " tabled" * ("<table" in words)
