@@ -7,6 +7,7 @@ docs/authoring.md has the rules for authors.
 import base64
 import io
 import re
+import xml.etree.ElementTree as ET
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,13 +21,14 @@ from rbclassroom.explorers import recorded
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections whose slides come after the last slide; the key E leads to them."""
-SKETCHES = Path(__file__).with_name("sketches")
 ROWS = 4
 """The largest number of table rows, or of works, on one slide."""
 SHORT = 300
 """An exercise stands below other ones if these have fewer characters than this."""
 _ITEM = re.compile(r"^(- )?\*\*([A-Z])\*\* (?:· )?(.*)$\n?", re.M)
-_PICTURE = re.compile(r"!\[\]\((\w+)/([\w-]+)\)")
+_PICTURE = re.compile(r"!\[\]\((?:(\w+)/)?([\w-]+)\)")
+_SVG = "http://www.w3.org/2000/svg"
+ET.register_namespace("", _SVG)
 _LIVING = re.compile(r"rbcourseDisplay\.revive\(image, (\{.*\})\);\s*\}</script>", re.S)
 
 
@@ -64,8 +66,9 @@ class Deck:
 
 
 class _Reader:
-    def __init__(self, root: Path, texts: dict[str, str]) -> None:
-        self.root, self.texts = root, texts
+    def __init__(self, path: Path, texts: dict[str, str]) -> None:
+        self.root, self.texts = path.resolve().parents[1], texts
+        self.sketches = path.parent / "slides" / f"{path.name[:2]}.svg"
         self.section = ""
         self.shown, self.behind = list[Slide](), list[Slide]()
         self.ahead = list[str]()  # notes for the next slide
@@ -85,7 +88,7 @@ class _Reader:
             parts = re.split(r"^\. \. \.$", _PICTURE.sub("", text), flags=re.M)
             slide = Slide(self.section, kind, [part.strip() for part in parts])
             if name := _PICTURE.search(text):
-                slide.picture, slide.aspect = self.borrowed(*name.groups())
+                slide.picture, slide.aspect = self.borrowed(*name.groups(default=""))
             self.put(slide)
 
     def put_verdict(self, text: str) -> None:
@@ -98,10 +101,9 @@ class _Reader:
         poll.notes += [f"Right: **{poll.right}**.", text]
 
     def borrowed(self, folder: str, name: str) -> tuple[str, float]:
-        """Return the sketch ``sketches/name``, or the picture of the cell ``lesson/name``."""
-        if folder == "sketches":
-            sketch = (SKETCHES / f"{name}.svg").read_text(encoding="utf-8")
-            return sketch, int(sketch.split(maxsplit=5)[4]) / 720  # its height can vary
+        """Return the sketch ``name``, or the picture of the cell ``lesson/name``."""
+        if not folder:
+            return sketch_of(self.sketches, name)
         path = self.root / "notebooks" / f"{folder}.ipynb"
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.id == name:
@@ -161,6 +163,23 @@ class _Reader:
             head = rows.pop(0) if rows[0].startswith("|") else ""
             for i in range(0, len(rows), ROWS):
                 self.put(Slide(words, "plain", [head + "".join(rows[i : i + ROWS])]))
+
+
+def sketch_of(path: Path, name: str) -> tuple[str, float]:
+    """Return a sketch of a file as SVG, and its width over the height of a panel."""
+    try:
+        sketch = ET.parse(path).find(f"{{{_SVG}}}svg[@id='{name}'][@viewBox]")
+    except ET.ParseError as error:
+        raise ValueError(f"slides/{path.name}: {error}") from error
+    if sketch is None:
+        raise ValueError(f"slides/{path.name} has no sketch {name} with a viewBox")
+    sketch.tail = None
+    for key in ("x", "y", "width", "height"):  # its place on the page of all sketches
+        sketch.attrib.pop(key, None)
+    for element in sketch.iter():
+        element.attrib.pop("id", None)  # a slide can show a sketch again
+    width = float(sketch.attrib["viewBox"].split()[2])
+    return ET.tostring(sketch, encoding="unicode"), width / 720  # the height can vary
 
 
 def picture_of(cell: NotebookNode, root: Path) -> tuple[str, float]:
@@ -250,7 +269,7 @@ def deck_of(path: Path) -> Deck:
             raise ValueError("it does not begin with a title, such as # The plane")
         file = path.parent / "slides" / f"{path.name[:2]}.md"
         texts = texts_of(file, [cell.id for cell in cells]) if file.exists() else {}
-        reader = _Reader(path.resolve().parents[1], texts)
+        reader = _Reader(path, texts)
         for cell in cells:
             reader.read(cell)
         title = reader.shown[0]

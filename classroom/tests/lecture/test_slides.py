@@ -3,7 +3,6 @@
 import base64
 import io
 import re
-import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import nbformat
@@ -15,8 +14,7 @@ from tiny import lesson_at
 pytest.importorskip("markdown_it", reason="slides are made in the environment of the book")
 
 from rbclassroom.lecture import deck as pages
-from rbclassroom.lecture import slides
-from rbclassroom.lecture.slides import deck_of, texts_of
+from rbclassroom.lecture.slides import deck_of, sketch_of, texts_of
 
 ROOT = Path(__file__).parents[3]
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
@@ -129,11 +127,36 @@ def test_a_picture_is_shown_with_the_text_of_its_cell(tmp_path):
     assert look in pages.section(wide)
     with pytest.raises(ValueError, match="there is no cell 01_tiny/nowhere"):
         tiny(tmp_path, text("## 1", "![](01_tiny/nowhere)"))
-    for missing in ("sketches/nowhere", "09_nowhere/cell"):
-        with pytest.raises(ValueError, match=r"^01_tiny\.ipynb: .*nowhere"):
-            tiny(tmp_path, text("## 1", f"![]({missing})"))
+    with pytest.raises(ValueError, match=r"^01_tiny\.ipynb: .*nowhere"):
+        tiny(tmp_path, text("## 1", "![](09_nowhere/cell)"))
     with pytest.raises(ValueError, match=r"no picture; 'course\.py figures' stores it"):
         tiny(tmp_path, (new_code_cell("1"), "Text."))
+
+
+SKETCHES = """<svg xmlns="http://www.w3.org/2000/svg" width="1440" height="90">
+<text x="0" y="9">it</text>
+<svg id="it" class="sketch" x="0" y="9" width="9" height="9" viewBox="0 0 1030 400">
+<path id="it-curve" d="M0 0 L1 1"/>
+</svg>
+</svg>
+"""
+
+
+def test_a_sketch_is_shown_beside_a_text(tmp_path):
+    path = tmp_path / "notebooks" / "slides" / "01.svg"
+    path.parent.mkdir(parents=True)
+    path.write_text(SKETCHES, encoding="utf-8")
+    deck = tiny(tmp_path, text("## 1", "Above.\n\n---\n\nBeside.\n\n![](it)"))
+    picture = deck.shown[2].picture
+    assert picture.startswith("<svg ")
+    assert re.findall(r' (\w+)="', picture.partition(">")[0]) == ["xmlns", "class", "viewBox"]
+    assert '<path d="M0 0 L1 1" />' in picture  # ids are names for the program only
+    assert 'class="split"' in pages.section(deck.shown[2])
+    with pytest.raises(ValueError, match=r"01_tiny\.ipynb: slides/01\.svg has no sketch is "):
+        tiny(tmp_path, text("## 1", "![](is)"))
+    path.write_text(SKETCHES[:-7], encoding="utf-8")
+    with pytest.raises(ValueError, match=r"01_tiny\.ipynb: slides/01\.svg: no element found: line"):
+        tiny(tmp_path, text("## 1", "![](it)"))
 
 
 VERDICT = """**B** It is even.
@@ -308,28 +331,12 @@ def pieces(formula):
     return [part for part in parts if part.strip()]
 
 
-def letters_of(sketch):
-    """Return the texts of a sketch."""
-    page = ET.parse(slides.SKETCHES / f"{sketch}.svg")
-    return " ".join("".join(each.itertext()) for each in page.iter() if each.tag.endswith("}text"))
-
-
-def test_each_sketch_has_a_description_and_a_slide():
-    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "notebooks/slides").glob("*.md")]
-    sketches = sorted(slides.SKETCHES.glob("*.svg"))
-    assert sketches
-    for path in sketches:
-        root = ET.parse(path).getroot()
-        assert re.fullmatch(r"0 -?\d+ (640|1030|1550) [1-8]\d\d", root.get("viewBox")), path.stem
-        assert root.get("aria-label")
-        assert any(f"![](sketches/{path.stem})" in text for text in texts), path.stem
-
-
 @pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
 def test_every_number_and_formula_on_a_slide_is_in_its_section(path):
     sections, now = [], []
     lesson = nbformat.read(path, as_version=4).cells
-    texts = texts_of(path.parent / "slides" / f"{path.name[:2]}.md", [cell.id for cell in lesson])
+    sketches = path.parent / "slides" / f"{path.name[:2]}.svg"
+    texts = texts_of(sketches.with_suffix(".md"), [cell.id for cell in lesson])
     for cell in lesson:
         if re.match(r"## ", cell.source):
             now = []
@@ -343,7 +350,10 @@ def test_every_number_and_formula_on_a_slide_is_in_its_section(path):
         known = plain(source)
         for cell in cells:
             slide = texts.get(cell.id, "")
-            lettering = "".join(map(letters_of, re.findall(r"!\[\]\(sketches/(\w+)\)", slide)))
+            names = re.findall(r"!\[\]\((\w+)\)", slide)
+            lettering = "".join(
+                re.sub("<[^>]*>", " ", sketch_of(sketches, name)[0]) for name in names
+            )
             slide = re.sub(r"!\[\]\([^)]*\)", "", slide)
             formulas = re.findall(r"\$\$?([^$]+)\$\$?", slide)
             for formula in formulas:
