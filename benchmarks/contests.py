@@ -17,10 +17,10 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
 import rbcourse as rb
-from rbclassroom.surveys.atlas import random_problems
+from rbclassroom.atlas import random_problems
+from rbclassroom.figures import FORMS
 from rbcourse import textbook
 from rbcourse.draw import animate, bodies
-from rbcourse.draw.save import FORMS
 
 sys.path.append(str(Path(__file__).parents[1] / "tests"))
 import oracles

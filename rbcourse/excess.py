@@ -1,6 +1,6 @@
 """The excess of a curve's cost over the optimum: the leading term, and an estimate.
 
-The results hold for small excursions; `rbclassroom.surveys.atlas` treats large excursions.
+The results hold for small excursions; `rbclassroom.atlas` treats large excursions.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import ordering
 import pytest
 
 import rbcourse as rb
-from rbclassroom.surveys.atlas import random_problems
+from rbclassroom.atlas import random_problems
 from rbcourse.bezier import bezier_deviation
 from rbcourse.curves import Ends
 

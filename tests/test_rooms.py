@@ -26,7 +26,7 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbclassroom.figures": {"rbcourse", "rbcourse.draw"},
     "rbclassroom.explorers": {"rbcourse", "rbcourse.draw"}
     | {"rbclassroom.course", "rbclassroom.figures"},
-    "rbclassroom.surveys": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
+    "rbclassroom.atlas": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
     "rbclassroom.course": {"rbcourse", "rbclassroom"},
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbcourse", "rbclassroom.course", "rbcourse.draw"},
@@ -44,7 +44,7 @@ LIBRARIES = {
     "rbclassroom": set(),
     "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
     "rbclassroom.figures": {"matplotlib"},
-    "rbclassroom.surveys": {"matplotlib", "threadpoolctl"},
+    "rbclassroom.atlas": {"threadpoolctl"},
     "rbclassroom.course": {"PIL", "jupyterlab", "nbclient", "nbformat", "tornado"},
     "rbclassroom.lecture": {"PIL", "markdown_it", "mdit_py_plugins", "nbformat"}
     | {"segno", "tornado"},

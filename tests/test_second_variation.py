@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbclassroom.surveys.atlas import random_problems
+from rbclassroom.atlas import random_problems
 from rbcourse.curves import Ends, with_inertia
 from rbcourse.optimum import optimum_of
 from rbcourse.optimum.chebyshev import grid

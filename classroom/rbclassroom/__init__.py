@@ -1,4 +1,4 @@
-"""The classroom of rbcourse: explorers, surveys, lessons, lectures, problem sets and the book.
+"""The classroom of rbcourse: explorers, an atlas, lessons, lectures, problem sets and the book.
 
 This package uses only the names that `rbcourse` exports.
 """

@@ -10,7 +10,7 @@ import io
 import logging
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,7 +21,6 @@ from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from numpy.typing import ArrayLike
 from PIL import Image
 
-import rbcourse as rb
 from rbcourse.draw.display import Display, Player
 from rbcourse.draw.pictures import as_pdf, data_url, drawn, png
 from rbcourse.draw.space import scenes
@@ -48,16 +47,6 @@ COLOURS = {
 """Colours by meaning, the same in all figures; they are distinct for the colour-blind."""
 PALE = "#8F8F8F"
 """The colour of the background artists, which has a contrast of 3 on white."""
-FORMS: dict[str, Callable[..., rb.Curve]] = {
-    "projection": rb.projected_cubic_so3,
-    "exponential": rb.exponential_cubic_so3,
-    "Bézier": rb.bezier_so3,
-    "corrected": rb.corrected_bezier_so3,
-    "cumulative": rb.cumulative_bezier_so3,
-    "quaternion": rb.quaternion_cubic_so3,
-    "Cayley": rb.cayley_cubic_so3,
-}
-"""The closed forms by their short names in figures and tables."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from rbclassroom.course.ledger import KEY, MISPRINTS, WHAT
 CONTENTS = tomllib.loads(Path(__file__).with_name("contents.toml").read_text("utf-8"))
 PAGES: dict[str, str] = CONTENTS["pages"]
 MOVED: dict[str, str] = CONTENTS["moved"]
-CLASSROOM = "explorers", "figures", "surveys", "course", "lecture", "assignments", "live", "book"
+CLASSROOM = "explorers", "figures", "atlas", "course", "lecture", "assignments", "live", "book"
 """The parts of `rbclassroom`; all other modules are in `rbcourse`."""
 
 _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
@@ -37,8 +37,8 @@ def file_of(module: str) -> str:
 
     Examples
     --------
-    >>> file_of("surveys.atlas"), file_of("optimum")
-    ('classroom/rbclassroom/surveys/atlas.py', 'rbcourse/optimum/__init__.py')
+    >>> file_of("atlas"), file_of("optimum")
+    ('classroom/rbclassroom/atlas.py', 'rbcourse/optimum/__init__.py')
     """
     path = full_name(module).replace(".", "/") + "/__init__" * (module == "optimum")
     return f"{'classroom/' * path.startswith('rbclassroom')}{path}.py"

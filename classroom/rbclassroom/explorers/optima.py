@@ -9,8 +9,9 @@ import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
 from rbclassroom.explorers.names import new_name, put_name
+from rbclassroom.figures import FORMS
 from rbcourse.draw.bodies import draw_box, draw_ground, move_box
-from rbcourse.draw.save import COLOURS, FORMS, PALE
+from rbcourse.draw.save import COLOURS, PALE
 
 Solved = tuple[list[rb.Curve], dict[str, str]]
 

@@ -17,8 +17,8 @@ import rbcourse
 from rbclassroom import explorers
 from rbclassroom.explorers.explorer import Explorer, numbers
 from rbclassroom.explorers.paths import JOINED
+from rbclassroom.figures import FORMS
 from rbcourse.draw.display import Player
-from rbcourse.draw.save import FORMS
 from rbcourse.files import replace_file
 
 _ABOUT = "This is a recording. In the lesson, with Python, you can move every control in all steps."

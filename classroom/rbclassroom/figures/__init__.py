@@ -1,14 +1,20 @@
 """Figures of single lessons: each module has the tables, drawings and captions for a lesson."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from scipy.optimize import isotonic_regression
 
-from rbcourse import Array
+from rbcourse import CLOSED_FORMS, Array, Curve
 from rbcourse.draw.save import Table
+
+_SHORT = {"projected": "projection", "bezier": "Bézier", "cayley": "Cayley"}
+FORMS: dict[str, Callable[..., Curve]] = {
+    _SHORT.get(first := name.partition("_")[0], first): make for name, make in CLOSED_FORMS.items()
+}
+"""The `rbcourse.CLOSED_FORMS` by their short names in figures and tables: their first words."""
 
 
 def columns(form: str, vectors: Mapping[str, Array], letters: str = "xyz") -> dict[str, Array]:
@@ -65,3 +71,40 @@ def name_ends(ax: Axes, gap: float = 0.1) -> None:
     for (x, y), line in zip(xy, lines, strict=True):
         name, colour = str(line.get_label()), line.get_color()
         ax.annotate(name, (x, y), (7, 0), color=colour, va="center", **style)
+
+
+def quantile(x: Array, share: float, decimals: int = 8) -> Array:
+    """Return the least y such that a fraction `share` of x, along the last axis, is at most y.
+
+    NaN does not count. The result is `rounded`.
+
+    Examples
+    --------
+    >>> float(quantile(np.array([3.0, 1.23456, np.nan, 0.1]), 0.5))
+    1.235
+    """
+    return rounded(np.nanquantile(x, share, axis=-1, method="inverted_cdf"), decimals)
+
+
+def rounded(x: Array, decimals: int = 8) -> Array:
+    """Return numbers rounded to four digits, and to at most `decimals` decimals."""
+    return np.vectorize(lambda y: round(float(f"{y:.4g}"), decimals) + 0.0, otypes=[float])(x)
+
+
+def in_words(excess: float) -> str:
+    """Return an excess as text, in percent or as a multiple of the optimum.
+
+    Examples
+    --------
+    >>> [in_words(x) for x in (-1e-12, 3.141e-3, 0.5, 46.2, 1e9, -0.3, np.nan)]
+    ['< 0.01 %', '0.31 %', '50 %', '47 ×', '> 10⁴ ×', '−30 %', '–']
+    """
+    if np.isnan(excess):
+        return "–"
+    if excess < -1e-4:
+        return f"−{-100 * excess:.2g} %"
+    if excess < 1e-4:
+        return "< 0.01 %"
+    if excess < 10:
+        return f"{100 * excess:.2g} %" if excess < 0.1 else f"{100 * excess:.0f} %"
+    return f"{1 + excess:.0f} ×" if excess < 1e4 else "> 10⁴ ×"

@@ -1,4 +1,4 @@
-"""Lesson 11: an animation of de Casteljau's construction, in the plane and on SO(3)."""
+"""Lesson 11: de Casteljau's construction in the plane and on SO(3); the symmetries of curves."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbclassroom.figures import columns
-from rbcourse import Array, Ends, angle_between, exp_so3, geodesic_so3
+from rbcourse import Array, Curve, Ends, angle_between, exp_so3, geodesic_so3, sample_rotation
 from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
+from rbcourse.sampling import Rng
 
 _SHARES = np.linspace(0, 1, 33)  # fractions of a leg at which points are drawn
 _LOOKS = (PALE, 2), ("0.35", 2), (COLOURS["optimum"], 3)
@@ -124,3 +125,23 @@ def _construct(
 
 def _on_geodesic(first: Array, last: Array, t: Array) -> Array:
     return geodesic_so3(first, last).at_own_times(np.tile(t[:, None], first.shape[1]))
+
+
+def defects(make: Callable[..., Curve], ends: Ends, *, rng: Rng = None) -> dict[str, float]:
+    """Return how far curves are from being invariant when their ends are moved or exchanged.
+
+    The values are the largest angles in rad over all problems at 33 values of t, for random
+    rotations L and Q (BK Prop. 3). "left" compares L R(t) with the curve of the ends moved by L,
+    "right" compares R(t) Q with the curve of the ends moved by Q, and "reversed" compares R(1 − t)
+    with the curve of the exchanged ends.
+    """
+    R0, R1, w0, w1 = ends
+    L, Q = sample_rotation(2, rng=rng)
+    t = np.linspace(0, 1, 33)
+    R = make(*ends)(t)
+    pairs = {
+        "left": (L @ R, make(L @ R0, L @ R1, w0, w1)),
+        "right": (R @ Q, make(R0 @ Q, R1 @ Q, w0 @ Q, w1 @ Q)),
+        "reversed": (R[::-1], make(R1, R0, -w1, -w0)),
+    }
+    return {name: float(angle_between(A, curve(t)).max()) for name, (A, curve) in pairs.items()}

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from rbclassroom.figures import columns, name_ends, name_lines, vectors
+from rbclassroom.figures.lesson12 import groups, heat_map, label_maps, shares
 from rbcourse import Array, Curve, geodesic_flow, log_so3, normal_cubic_so3
 from rbcourse.draw.save import COLOURS, Table
 
@@ -151,3 +153,34 @@ def _by_kind(data: Table) -> dict[str, list[Array]]:
     for name, motion in vectors(_FREE, data, "xy").items():
         found.setdefault(name.rpartition(" ")[0], []).append(motion)
     return found
+
+
+def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None:
+    """Draw heat maps of medians, with a row for each body and a column for each curve.
+
+    `data` has rows of the stored table "maps" of `rbclassroom.atlas`. `curves` maps names of curves
+    in this table to headings of the figure (beyond BK 3).
+    """
+    bodies = groups(data, "body")
+    axes = fig.subplots(len(bodies), len(curves), sharex=True, sharey=True, squeeze=False)
+    for row, (body, cells) in zip(axes, bodies.items(), strict=True):
+        row[0].set_ylabel(body if len(bodies) > 1 else "")
+        for ax, (curve, title) in zip(row, curves.items(), strict=True):
+            drawn = heat_map(ax, title if ax in axes[0] else "", cells[f"{curve} median [1]"])
+    bar = fig.colorbar(drawn, ax=axes, fraction=0.025, pad=0.02)
+    bar.ax.set_title("median\nexcess", loc="left")
+    label_maps(fig, bar)
+
+
+def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
+    """Return a description of the figure of `draw_body_atlas`."""
+    titles, said = {x: title.replace("\n", " ") for x, title in curves.items()}, []
+    for body, cells in groups(data, "body").items():
+        each = (f"{title} {shares(cells[f'{x} median [1]'])}" for x, title in titles.items())
+        said.append(f"{body}: {', '.join(each)}")
+    return (
+        "Median of the cost over the optimum minus 1, with a row for each body and a column for "
+        "each curve. In each heat map, to the right the displacement grows from 0 to 180 degrees, "
+        "and upwards the end velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
+        f"{'; '.join(said)}."
+    )

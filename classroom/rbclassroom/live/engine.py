@@ -34,7 +34,7 @@ APART = {"matplotlib-pyodide", "pytz", "fonttools"}
 """Declared dependencies that Matplotlib does not need; only writing a PDF needs fonttools."""
 PACKED = {"pyodide.asm.js", "pyodide.asm.wasm"}
 """Files that are stored compressed, as ``.packed``, because not every server compresses."""
-OWN = "*.py", "assignments/*.py", "figures/*", "surveys/*", "live/cells.py"
+OWN = "*.py", "*.csv", "assignments/*.py", "figures/*", "live/cells.py"
 """The files of `rbclassroom` in the pages; all files of `rbcourse` are there, too."""
 START = "*.packed", "pyodide.js", "*.json", "python_stdlib.zip", "rbcourse.zip", "numpy-*.whl"
 """The files that are loaded before the first result."""

@@ -34,10 +34,10 @@ def test_links_between_files_become_links_between_pages():
 
 
 def test_each_module_is_mapped_to_its_page():
-    for module in ("draw.save", "surveys.atlas", "optimum"):
+    for module in ("draw.save", "atlas", "optimum"):
         assert source_of(file_of(module)) == f"package/{module}.rst"
     assert full_name("draw.save") == "rbcourse.draw.save"
-    assert full_name("surveys.atlas") == "rbclassroom.surveys.atlas"
+    assert full_name("atlas") == "rbclassroom.atlas"
     problem_set = "notebooks/assignments/source/ps1/ps1.ipynb"
     for path in ("rbcourse/_foam.py", "course.py", "LICENSE", problem_set):
         assert source_of(path) is None

@@ -17,12 +17,12 @@ from rbclassroom.figures import (
     lesson06,
     lesson08,
     lesson09,
+    lesson12,
     lesson13,
     lesson14,
     lesson15,
     vectors,
 )
-from rbclassroom.surveys import atlas_figures
 
 MARGINS = {
     "family": np.array(["random"] * 4 + ["Figure 5", "no turn", "no turn"]),
@@ -206,8 +206,8 @@ def test_descriptions_of_the_atlas_state_its_numbers():
         table |= {f"{way} median excess [1]": k * 1e-3 * size**4}
     table["size [rad]"], (ax,) = size, axes_of(None)
     words = "projection from 3.9e-06 to 8.1e-02", "normal from 1.2e-05 to 2.4e-01"
-    check_said(atlas_figures.describe_growth(table), *words)
-    atlas_figures.draw_growth(ax, table, {2: 0.01})  # it has only the curves in the table
+    check_said(lesson12.describe_growth(table), *words)
+    lesson12.draw_growth(ax, table, {2: 0.01})  # it has only the curves in the table
     check_held([ax], {("", "_"): [[0.25, 0.5, 1], [0.01, 0.04, 0.16]]})
     ticks = [tick.get_text() for tick in ax.get_yticklabels()]
     assert all(tick.startswith(r"$\mathregular{10^") for tick in ticks) or not any(
@@ -224,14 +224,14 @@ def test_descriptions_of_the_atlas_state_its_numbers():
         "Figure 5: 70 % at 1.700. no turn: 50 % at 2.000, 150 % at 2.000.",
         "least margin of the quaternions is 0.60",
     )
-    check_said(atlas_figures.describe_margins(MARGINS), *words)
-    said = atlas_figures.describe_deviations(numbers("lesson12_deviations"))
+    check_said(lesson12.describe_margins(MARGINS), *words)
+    said = lesson12.describe_deviations(numbers("lesson12_deviations"))
     check_said(said, f"Bézier d {1 / 16 / 12 / 9:.1e}")
 
 
 def test_each_problem_has_the_marker_of_its_family():
     axes, line, held = axes_of(None, None), np.array([0.02, 0.7]), {}
-    atlas_figures.draw_margins(axes, MARGINS)
+    lesson12.draw_margins(axes, MARGINS)
     for way in ("projection", "quaternion"):
         points = np.array([MARGINS[f"{way} {name} [1]"] for name in ("margin", "excess")])
         held[way, "no turn"] = points[:, 5:]

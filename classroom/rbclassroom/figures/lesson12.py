@@ -1,4 +1,4 @@
-"""Figures of the atlas: heat maps, and the excess against the excursion or the margin."""
+"""Lesson 12: heat maps of the atlas, and the excess over the excursion or the margin."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 
-from rbclassroom.figures import name_ends, name_lines
-from rbclassroom.surveys.atlas import CELLS, FASTEST, WAYS
+from rbclassroom.figures import FORMS, name_ends, name_lines, named
 from rbcourse import Array
 from rbcourse.draw.save import COLOURS, Table
 
@@ -27,6 +26,8 @@ _LOOKS: dict[str, tuple[str, str]] = {
 }
 _OF_BODY = {"weighted": ("z", "p"), "Bézier": ("reference", "^")}
 """Other looks of curves in figures with the weighted projection, as in the sketches."""
+_OTHER = "path", "."
+"""The look of any other curve."""
 _DASHES = ("white", 5, "-"), ("black", 3, "--")
 """Colour, width and style of two lines, which together mark 10 % on every colour."""
 _SUM = "least sum of the two\nsmallest singular values (rotation: 2)"
@@ -34,12 +35,7 @@ _NORM = "least norm\nof the cubic (rotation: 1)"
 _MARGINS = {"projection": (_SUM, [0.01, 0.1, 1, 2]), "quaternion": (_NORM, [0.5, 1])}
 
 
-def of_family(data: Table, family: str) -> dict[str, Array]:
-    """Return the rows of a table that belong to a family."""
-    return _groups(data, "family")[family]
-
-
-def _groups(data: Table, by: str) -> dict[str, dict[str, Array]]:
+def groups(data: Table, by: str) -> dict[str, dict[str, Array]]:
     """Return the rows of a table, grouped by the words in a column."""
     columns = {name: np.asarray(column) for name, column in data.items()}
     return {
@@ -48,63 +44,33 @@ def _groups(data: Table, by: str) -> dict[str, dict[str, Array]]:
     }
 
 
-def draw_atlas(fig: Figure, data: Table, family: str, quantile: str) -> None:
-    """Draw a heat map of each closed form for a family, with a colour for each power of ten.
+def draw_atlas(fig: Figure, data: Table, quantile: str) -> None:
+    """Draw a heat map of each closed form, with a colour for each power of ten.
 
-    A dashed line marks 10 %. `data` is a table of `rbclassroom.surveys.atlas.cell_table`. The
-    scale of colours is in the upper right corner, with the name of the `quantile` (BK 1, BK 7).
+    A dashed line marks 10 %. `data` has the rows of one family of `rbclassroom.atlas.cell_table`.
+    The scale of colours is in the upper right corner, with the name of the `quantile` (BK 1, BK 7).
     """
-    axes = fig.subplots(2, 4, sharex=True, sharey=True)
-    cells = of_family(data, family)
+    axes = fig.subplots(2, len(FORMS) // 2 + 1, sharex=True, sharey=True)
     corner = axes[0, -1]
-    for ax, way in zip(axes[axes != corner], WAYS, strict=True):
-        drawn = _heat_map(ax, way, cells[f"{way} excess [1]"])
-    corner.set_axis_off()
+    for ax in axes.flat:
+        ax.set_axis_off()
+    for ax, way in zip(axes[axes != corner], FORMS, strict=False):
+        ax.set_axis_on()
+        drawn = heat_map(ax, way, np.asarray(data[f"{way} excess [1]"]))
     corner.set_title(f"excess, {quantile}")
     bar = fig.colorbar(drawn, cax=corner.inset_axes((0.3, -0.12, 0.08, 1.12)))
-    _label(fig, bar, f", {family} the axis")
+    label_maps(fig, bar, f", {_family(data)} the axis")
 
 
-def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None:
-    """Draw heat maps of medians, with a row for each body and a column for each curve.
-
-    `data` is a table of `rbclassroom.surveys.body_atlas.maps`. `curves` maps names of
-    columns of this table to headings of the figure (beyond BK 3).
-    """
-    bodies = _groups(data, "body")
-    axes = fig.subplots(len(bodies), len(curves), sharex=True, sharey=True, squeeze=False)
-    for row, (body, cells) in zip(axes, bodies.items(), strict=True):
-        row[0].set_ylabel(body if len(bodies) > 1 else "")
-        for ax, (curve, title) in zip(row, curves.items(), strict=True):
-            heading = title if ax in axes[0] else ""
-            drawn = _heat_map(ax, heading, cells[f"{curve} median [1]"])
-    bar = fig.colorbar(drawn, ax=axes, fraction=0.025, pad=0.02)
-    bar.ax.set_title("median\nexcess", loc="left")
-    _label(fig, bar)
-
-
-def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
-    """Return a description of the figure of `draw_body_atlas`."""
-    titles, said = {x: title.replace("\n", " ") for x, title in curves.items()}, []
-    for body, cells in _groups(data, "body").items():
-        shares = {x: _shares(cells[f"{x} median [1]"], [_TENTH]) for x in titles}
-        said.append(f"{body}: {', '.join(f'{titles[x]} {share}' for x, share in shares.items())}")
-    return (
-        "Median of the cost over the optimum minus 1, with a row for each body and a column for "
-        "each curve. In each heat map, to the right the displacement grows from 0 to 180 degrees, "
-        "and upwards the end velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
-        f"{'; '.join(said)}."
-    )
-
-
-def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
-    """Draw the excess in each cell, in the order of the cells, and a dashed line at 10 %.
+def heat_map(ax: Axes, title: str, excess: Array) -> Any:
+    """Draw the excess in each cell of the atlas, and a dashed line at 10 %.
 
     If the excess is below all levels everywhere, a text on the map states this.
     """
-    turns, speeds = (np.linspace(0, end, CELLS + 1) for end in (180, FASTEST))
+    cells = round(np.sqrt(len(excess)))
+    turns, speeds = (np.linspace(0, end, cells + 1) for end in (180, 9))
     x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (turns, speeds))
-    excess = np.asarray(excess).reshape(CELLS, CELLS).T
+    excess = excess.reshape(cells, cells).T
     norm: Any = BoundaryNorm(_LEVELS, 256, extend="both")
     drawn = ax.pcolormesh(turns, speeds, excess, norm=norm, cmap="viridis_r")
     if np.nanmin(excess) < _TENTH < np.nanmax(excess):
@@ -121,7 +87,8 @@ def _heat_map(ax: Axes, title: str, excess: Array) -> Any:
     return drawn
 
 
-def _label(fig: Figure, bar: Any, ways: str = "") -> None:
+def label_maps(fig: Figure, bar: Any, ways: str = "") -> None:
+    """Write what the axes of heat maps and their scale of colours show."""
     fig.supylabel(f"end velocity{ways} (rad)", fontsize="medium")
     fig.supxlabel("displacement (°)", fontsize="medium")
     levels = sorted({*_LEVELS[::2], _TENTH})
@@ -130,33 +97,24 @@ def _label(fig: Figure, bar: Any, ways: str = "") -> None:
         bar.ax.axhline(_TENTH, color=colour, lw=width, ls=dash)
 
 
-def _set_percents(ax: Axes, levels: list[float]) -> None:
-    ax.set_yticks(levels, _percents(levels))
-    ax.set_ylabel("cost / optimum − 1")
-
-
-def _percents(levels: list[float]) -> list[str]:
-    """Return levels as text in percent; if any is far from 1 %, write all as powers of ten."""
-    powers = np.log10(levels).round().astype(int) + 2
-    if np.abs(powers).max() > 4:
-        return [rf"$\mathregular{{10^{{{power}}}}}$ %" for power in powers]
-    return [f"{100 * level:,.9g} %" for level in levels]
-
-
-def describe_atlas(data: Table, family: str, quantile: str) -> str:
+def describe_atlas(data: Table, quantile: str) -> str:
     """Return a description of the figure of `draw_atlas`."""
-    cells = of_family(data, family)
     levels = 0.01, _TENTH, 1
-    said = "; ".join(f"{way} {_shares(cells[f'{way} excess [1]'], levels)}" for way in WAYS)
+    said = "; ".join(f"{way} {shares(data[f'{way} excess [1]'], levels)}" for way in FORMS)
     return (
-        f"Cost of closed forms over the optimum minus 1, {quantile}, for end velocities {family} "
-        "the axis of the displacement. In each heat map, to the right the displacement grows from "
-        "0 to 180 degrees, and upwards the end velocity from 0 to 9 rad. Share of the cells below "
-        f"1, 10 and 100 %, in percent: {said}."
+        f"Cost of closed forms over the optimum minus 1, {quantile}, for end velocities "
+        f"{_family(data)} the axis of the displacement. In each heat map, to the "
+        "right the displacement grows from 0 to 180 degrees, and upwards the end velocity from 0 "
+        f"to 9 rad. Share of the cells below 1, 10 and 100 %, in percent: {said}."
     )
 
 
-def _shares(excess: Array, levels: Sequence[float]) -> str:
+def _family(data: Table) -> str:
+    return str(np.asarray(data["family"])[0])
+
+
+def shares(excess: Any, levels: Sequence[float] = (_TENTH,)) -> str:
+    """Return the shares of the cells with an excess below each level, in percent, as text."""
     return ", ".join(f"{100 * np.mean(excess < level):.0f}" for level in levels)
 
 
@@ -169,7 +127,7 @@ def draw_growth(ax: Axes, data: Table, slopes: Mapping[int, float]) -> None:
     size, medians = np.asarray(data["size [rad]"]), _medians(data)
     looks = _LOOKS | (_OF_BODY if "weighted" in medians else {})
     for way, median in medians.items():
-        colour, mark = looks[way]
+        colour, mark = looks.get(way, _OTHER)
         ax.plot(size, median, "-", marker=mark, ms=8, label=way, color=COLOURS[colour])
     ax.set(xscale="log", yscale="log", ymargin=0.1, xlabel="size $s$ of the excursion (rad)")
     x, grey = np.array([size[0], 0.5, 1]), COLOURS["reference"]
@@ -201,8 +159,8 @@ def describe_growth(data: Table) -> str:
 
 
 def _medians(data: Table) -> dict[str, Array]:
-    columns = {way: f"{way} median excess [1]" for way in _LOOKS | _OF_BODY}
-    return {way: np.asarray(data[column]) for way, column in columns.items() if column in data}
+    medians = named(" median excess [1]", data)
+    return {way: medians[way] for way in _LOOKS | medians if way in medians}
 
 
 def draw_margins(axes: Sequence[Axes], data: Table) -> None:
@@ -214,7 +172,7 @@ def draw_margins(axes: Sequence[Axes], data: Table) -> None:
     for ax, (way, (name, ticks)) in zip(axes, _MARGINS.items(), strict=True):
         dots: Any = {"color": COLOURS[_LOOKS[way][0]], "ms": 4, "rasterized": True}
         marks: Any = [{"color": "black", "mec": "white", "ms": size} for size in (17, 9)]
-        looks = zip(_groups(data, "family").items(), ".*D", [dots, *marks], strict=False)
+        looks = zip(groups(data, "family").items(), ".*D", [dots, *marks], strict=False)
         for (family, rows), mark, style in looks:
             ax.plot(*_margins(rows, way), mark, label=family, **style)
         ax.set(xscale="log", yscale="log", title=way, xlabel=f"margin: {name}")
@@ -228,7 +186,7 @@ def draw_margins(axes: Sequence[Axes], data: Table) -> None:
 
 def describe_margins(data: Table) -> str:
     """Return a description of the figure of `draw_margins`."""
-    first, *others = _groups(data, "family").items()
+    first, *others = groups(data, "family").items()
     margin, excess = _margins(first[1], "projection")
     low, high = (np.nanmedian(excess[x]) for x in (margin < 0.2, margin > 1))
     said = ""
@@ -244,9 +202,21 @@ def describe_margins(data: Table) -> str:
     )
 
 
-def _margins(data: Table, way: str) -> tuple[Array, Array]:
-    margin, excess = (np.asarray(data[f"{way} {name} [1]"]) for name in ("margin", "excess"))
-    return margin, excess
+def _margins(data: Table, way: str) -> list[Array]:
+    return [np.asarray(data[f"{way} {name} [1]"]) for name in ("margin", "excess")]
+
+
+def _set_percents(ax: Axes, levels: list[float]) -> None:
+    ax.set_yticks(levels, _percents(levels))
+    ax.set_ylabel("cost / optimum − 1")
+
+
+def _percents(levels: list[float]) -> list[str]:
+    """Return levels as text in percent; if any is far from 1 %, write all as powers of ten."""
+    powers = np.log10(levels).round().astype(int) + 2
+    if np.abs(powers).max() > 4:
+        return [rf"$\mathregular{{10^{{{power}}}}}$ %" for power in powers]
+    return [f"{100 * level:,.9g} %" for level in levels]
 
 
 def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
@@ -256,11 +226,10 @@ def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
     """
     titles = {"d": "difference $d$, across the axis", "e": "mean $e$, across the axis"}
     for ax, (letter, title) in zip(axes, titles.items(), strict=True):
-        for name in (name for name in data if name.endswith(f" {letter} [1]")):
-            way = name.removesuffix(f" {letter} [1]")
+        for way, deviation in named(f" {letter} [1]", data).items():
             colour, mark = _LOOKS[way]
             style: Any = {"color": COLOURS[colour], "marker": mark, "markevery": 10}
-            ax.plot(data["t [1]"], data[name], label=way, **style)
+            ax.plot(data["t [1]"], deviation, label=way, **style)
         ax.axhline(0, color="0.8", lw=1, zorder=0)
         ax.set(title=title, xlabel="time $t$", ylim=(-0.0068, 0.0068), yticks=[-0.004, 0, 0.004])
         ax.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])

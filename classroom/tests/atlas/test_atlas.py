@@ -1,0 +1,187 @@
+"""Test the atlas: its problems, its surveys on any executor, its tables, and its heat maps."""
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.stats import binom
+
+import rbcourse as rb
+from rbclassroom import atlas
+from rbclassroom.figures import FORMS, lesson12, lesson13, quantile, rounded
+
+SOME = atlas.random_problems(60, 3, rng=2)
+BOOK = atlas.BODIES["book"]
+
+
+def norms(x):
+    return np.linalg.norm(x, axis=-1)
+
+
+def test_each_cell_has_problems_of_its_family():
+    ends = atlas.atlas_problems(40, ["along", "across", "any"], rng=1)
+    family, turn, speed, _ = np.indices((3, 10, 10, 40)).reshape(4, -1)
+    sigma, v = rb.log_so3(ends.R0.mT @ ends.R1), np.hypot(norms(ends.w0), norms(ends.w1))
+    assert np.array_equal(np.floor(norms(sigma) / (np.pi / 10)), turn)
+    assert np.array_equal(np.floor(v / 0.9), speed)
+    for x, y in ((ends.w0, sigma), (ends.w1, sigma), (ends.w0, ends.w1)):
+        cosine = np.sum(x * y, axis=-1) / norms(x) / norms(y)
+        along, across, free = cosine.reshape(3, -1)
+        assert np.abs(np.abs(along) - 1).max() < 1e-9
+        assert 0.45 < np.mean(along > 0) < 0.55
+        assert np.median(np.abs(across)) == pytest.approx(0 if y is sigma else 0.5**0.5, abs=0.03)
+        assert np.quantile(free, [0.25, 0.5, 0.75]) == pytest.approx([-0.5, 0, 0.5], abs=0.04)
+    inside = atlas.domain("medium", 40)
+    assert np.array_equal(inside, (norms(sigma) < np.pi / 2)[family == 2] & (v < 4.5)[family == 2])
+
+
+def test_random_problems_are_uniform_in_balls():
+    ends = atlas.random_problems(4000, 1.5, rng=3)
+    for x, radius in ((rb.log_so3(ends.R0.mT @ ends.R1), 1.5), (ends.w0, 3), (ends.w1, 3)):
+        share = (norms(x) / radius) ** 3  # the share of the ball closer to the centre than x
+        assert share.max() < 1 + 1e-9
+        assert np.quantile(share, [0.25, 0.5, 0.75]) == pytest.approx([0.25, 0.5, 0.75], abs=0.05)
+        assert np.abs(x.mean(axis=0)).max() < 0.15 * radius
+
+
+@pytest.mark.source("BK (18)", "beyond BK 1", "beyond BK 2")
+@pytest.mark.parametrize("inertia", [None, BOOK], ids=["ball", "book"])
+def test_a_survey_has_the_optimum_and_the_cost_of_every_curve(inertia):
+    sharp = rb.Ends(np.eye(3)[None], rb.exp_so3([[0, 0, np.radians(179.8)]]), *np.zeros((2, 1, 3)))
+    assert rb.projected_cubic_so3(*sharp).margin < 0.004
+    few = rb.Ends(*map(np.concatenate, zip(sharp, SOME.take(slice(20)), strict=True)))
+    found, best = atlas.survey(few, inertia=inertia), rb.minimum_acceleration_so3(*few, inertia)
+    assert found.pop("optimum") == pytest.approx(best.cost, rel=1e-12)
+    of_body = {"weighted": rb.weighted_cubic_so3, "normal": rb.normal_cubic_so3}
+    makers = FORMS | {way: partial(make, inertia=inertia) for way, make in of_body.items()}
+    assert set(found) == set(FORMS if inertia is None else makers)
+    for way, cost in found.items():
+        assert cost == pytest.approx(rb.acceleration_cost(makers[way](*few), inertia), rel=1e-6)
+        assert np.all(cost > (1 - 1e-6) * best.cost)
+
+
+def test_every_executor_gives_the_same_bytes(monkeypatch, capsys):
+    monkeypatch.setattr(atlas, "CHUNK", 5)
+    few, known, found = SOME.take(slice(15)), {"inertia": BOOK, "ways": {"z": rb.bezier_so3}}, []
+    with ThreadPoolExecutor(3) as threads:
+        threads.submit = Mock(wraps=threads.submit)
+        for executor in (None, threads):
+            costs = atlas.survey(few, executor, title="A", **known)
+            found.append({name: x.tobytes() for name, x in costs.items()})
+    assert found[0] == found[1]
+    assert threads.submit.call_count == 3
+    assert capsys.readouterr().out == 2 * "A: 5 of 15\rA: 10 of 15\rA: 15 of 15\n"
+    assert atlas.survey(few.take(slice(0)), **known)["optimum"].shape == (0,)
+
+
+def test_an_unsolved_problem_costs_nan_and_an_error_names_the_curve():
+    fast = SOME.take(slice(3))._replace(w0=1e3 * np.eye(3), w1=1e3 * np.eye(3)[[1, 2, 0]])
+    assert np.isnan(atlas.survey(fast, ways={})["optimum"]).all()
+    with pytest.raises(ValueError, match="below 3π") as caught:
+        atlas.survey(fast)
+    assert caught.value.__notes__ == ["This is the curve 'Bézier' of the survey."]
+
+
+def test_the_excess_is_nan_if_the_optimum_is_near_zero():
+    """For a turn by a with w0 = w1 = a + d along its axis, the optimum costs 24 d²."""
+    a, d = 1.0, np.array([0.0, 0.005, 0.01, 0.5])
+    e, R0 = np.eye(3)[2], np.tile(np.eye(3), (4, 1, 1))
+    w = (a + d)[:, None] * e
+    ends = rb.Ends(R0, rb.exp_so3(np.tile(a * e, (4, 1))), w, w)
+    excess = atlas.excesses(ends, {"optimum": 24 * d**2, "other": 48 * d**2})
+    assert list(excess) == ["other"]
+    assert excess["other"] == pytest.approx([np.nan, 1, 1, 1], nan_ok=True)
+
+
+def test_the_table_has_quantiles_of_the_sample_for_each_cell():
+    excess = np.arange(2 * 10 * 10 * 5.0)
+    excess[:2] = np.nan
+    table = atlas.cell_table({"one": excess, "two": 2 * excess}, 5, {"median": 0.5, "most": 0.8})
+    assert table["family"].tolist() == ["along"] * 100 + ["across"] * 100
+    some = [0, 9, 10, 199]
+    assert table["displacement [rad]"][some] == pytest.approx(np.radians([9, 9, 27, 171]))
+    assert table["end velocity [rad]"][some] == pytest.approx([0.45, 8.55, 0.45, 8.55])
+    assert table["problems [1]"].tolist() == [3] + [5] * 199
+    middle = np.array([3, *(np.arange(1, 200) * 5 + 2)])
+    assert table["one median [1]"] == pytest.approx(middle, rel=5e-4)
+    assert table["two most [1]"][1:] == pytest.approx(2 * (middle[1:] + 1), rel=5e-4)
+    few = np.array([123456.0, 0.00123456, 1.26e-8, -1e-12])
+    assert rounded(few).tolist() == [123500.0, 0.001235, 1e-8, 0.0]
+    assert quantile(few, 0.75) == 0.001235
+
+
+def test_the_maps_use_only_the_first_seed_and_intervals_are_binomial(tmp_path, monkeypatch):
+    made = []
+
+    def invented(problems, inertia, executor, title):
+        x = 0.2 * np.random.default_rng(len(made)).random(5000)
+        x[:7] = np.nan
+        made.append(x)
+        return {"one": x, "two": 2 + x}
+
+    monkeypatch.setattr(atlas, "body_excesses", invented)
+    monkeypatch.setattr(atlas, "TABLES", tmp_path)
+    atlas.write_tables(50, [5, 6])
+    maps, table = atlas.stored("maps"), atlas.stored("intervals")
+    assert maps["body"].tolist() == [body for body in atlas.BODIES for _ in range(100)]
+    assert maps["problems [1]"].tolist() == 3 * ([43] + 99 * [50])
+    cells = np.sort(np.reshape(made[:3], (300, 50)))
+    assert maps["two 90 % [1]"][1:100] == pytest.approx(2 + cells[1:100, 44], rel=5e-4)
+    assert table["seed [1]"].tolist() == 18 * [5] + 18 * [6]
+    for row, domain in zip((0, 2, 4), atlas.DOMAINS, strict=True):
+        x = np.sort(made[0][atlas.domain(domain, 50)])
+        x = x[~np.isnan(x)]
+        for name, share in (("median", 0.5), ("90 %", 0.9)):
+            # entry k is the probability that at most k of the n values are below the quantile
+            fewer = binom.cdf(np.arange(len(x)), len(x), share)
+            ends = x[np.sum(fewer <= 0.025) - 1], x[np.sum(fewer < 0.975)]
+            found = [table[f"{name}{end} [1]"][row] for end in ("", " low", " high")]
+            assert found == pytest.approx([np.quantile(x, share), *ends], rel=5e-4)
+        low, part, high = (table[f"within a tenth{x} [1]"][row] for x in (" low", "", " high"))
+        few = np.sum(x < 0.1)
+        assert part == pytest.approx(few / len(x), rel=5e-4)
+        assert binom.cdf(few, len(x), high) == pytest.approx(0.025, rel=0.05)
+        assert binom.sf(few - 1, len(x), low) == pytest.approx(0.025, rel=0.05)
+
+
+def test_heat_maps_show_each_cell_at_its_place_and_a_line_at_10_percent():
+    # the logarithm of the excess increases with the displacement
+    slope = np.linspace(-3, 1, 10)
+    data = {"family": np.full(100, "along")}
+    data |= {f"{way} excess [1]": 10.0 ** np.repeat(slope, 10) for way in FORMS}
+    data["Bézier excess [1]"] = np.zeros(100)
+    fig = Figure(figsize=(9, 6))
+    lesson12.draw_atlas(fig, data, "median")
+    maps = {ax.get_title(): ax for ax in fig.axes if ax.get_title() in FORMS}
+    for way, ax in maps.items():
+        edges = np.asarray(ax.collections[0].get_coordinates())
+        assert edges[0, :, 0] == pytest.approx(np.arange(0, 181, 18))
+        assert edges[:, 0, 1] == pytest.approx(np.arange(0, 9.1, 0.9))
+        shown = ax.collections[0].get_array()
+        assert np.array_equal(shown, data[f"{way} excess [1]"].reshape(10, 10).T)
+        assert bool(ax.texts) == (way == "Bézier")  # "< 0.01 % everywhere"
+    for line in maps["projection"].collections[1:]:
+        drawn = np.concatenate(line.get_paths()[0].to_polygons(closed_only=False))
+        assert drawn[:, 0] == pytest.approx(np.interp(-1, slope, np.arange(9, 180, 18)))
+    said = lesson12.describe_atlas(data, "median")
+    assert "along the axis of the displacement" in said
+    assert "Bézier 100, 100, 100; corrected 30, 50, 70;" in said
+
+
+def test_rows_of_maps_are_bodies_and_columns_are_curves():
+    names = {"one": "curve\none", "two": "another"}
+    excess = np.random.default_rng(2).random((2, 2, 100))
+    data = {"body": np.repeat(["ball", "book"], 100)}
+    data |= {f"{x} median [1]": excess[:, k].ravel() for k, x in enumerate(names)}
+    fig = Figure(figsize=(9, 6))
+    lesson13.draw_body_atlas(fig, data, names)
+    *maps, _ = fig.axes
+    assert [ax.get_title() for ax in maps[:2]] == ["curve\none", "another"]
+    assert [ax.get_ylabel() for ax in maps[::2]] == ["ball", "book"]
+    for ax, wanted in zip(maps, excess.reshape(4, 10, 10), strict=True):
+        assert np.array_equal(ax.collections[0].get_array(), wanted.T)
+    share = 100 * np.mean(excess[1, 0] < 0.1)
+    assert f"book: curve one {share:.0f}," in lesson13.describe_body_atlas(data, names)
