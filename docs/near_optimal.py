@@ -1,4 +1,4 @@
-"""Derive the numbers in near_optimal.md exactly, and write rbcourse/leading_excess.csv.
+"""Derive the numbers in near_optimal.md exactly, and print the leading terms of the excess.
 
 Three vectors describe a problem. The rotation vector from R0 to R1 is sigma. Let u0 and u1 be the
 end velocities, carried to the middle by parallel transport. Their mean is sigma + e, and
@@ -6,17 +6,13 @@ d = u1 - u0. A term of third order is a linear combination of sigma, e and d. Th
 three coefficients in a list. They are polynomials in t and in the inner products of sigma, e and d.
 """
 
-import csv
 from itertools import pairwise
-from math import lcm
-from pathlib import Path
 
 from sympy import QQ, ring
 
 RING, t, ss, ee, dd, se, sd, ed = ring("t, ss, ee, dd, se, sd, ed", QQ)
 INNER = [[ss, se, sd], [se, ee, ed], [sd, ed, dd]]
 NAMES = ["ss", "ee", "dd", "se", "sd", "ed"]
-TABLE = Path(__file__).parents[1] / "rbcourse" / "leading_excess.csv"
 
 one = RING.one
 sigma = [one, 0 * one, 0 * one]
@@ -247,19 +243,6 @@ def of_splines():
     return [*found, found[1] / 16]
 
 
-def write(table=TABLE):
-    """Write the polynomials to a table of powers, with coefficients over a common denominator."""
-    found = forms()
-    over = {way: lcm(*(int(c.denominator) for c in form.coeffs())) for way, form in found.items()}
-    powers = sorted({term for form in found.values() for term in form.monoms()}, reverse=True)
-    with open(table, "w", newline="", encoding="utf-8") as file:
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow([*NAMES, *found])
-        rows.writerow([""] * 5 + ["over", *over.values()])
-        for power in powers:
-            row = [form.get(power, 0) * over[way] for way, form in found.items()]
-            rows.writerow([*power[1:], *row])
-
-
 if __name__ == "__main__":
-    write()
+    for way, form in forms().items():
+        print(f"{way}: E = {form}\n")

@@ -54,7 +54,7 @@ from rbcourse.conversions import (
 )
 from rbcourse.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
 from rbcourse.curves import Curve, Ends, geodesic_so3, retime
-from rbcourse.excess import excess_estimate, leading_excess
+from rbcourse.excess import excess_estimate
 from rbcourse.files import read_path, write_path
 from rbcourse.metrics import METRIC_SE3, METRIC_SO3
 from rbcourse.motions import (
@@ -72,7 +72,6 @@ from rbcourse.optimum import (
     minimum_torque_so3,
     stationary_so3,
 )
-from rbcourse.optimum.shooting import shoot_minimum_acceleration_so3
 from rbcourse.optimum.splines import (
     OptimalChain,
     is_local_minimum,
@@ -210,13 +209,11 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "minimum_acceleration_se3",
     "minimum_torque_so3",
     "minimum_jerk_so3",
-    "shoot_minimum_acceleration_so3",
     "stationary_so3",
     "Optimum",
     "ConvergenceError",
     "acceleration_cost",
     "excess_estimate",
-    "leading_excess",
     "acceleration_cost_parts",
     "torque_cost",
     "jerk_cost",

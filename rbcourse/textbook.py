@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rbcourse._numerics import Array
+from rbcourse.bezier import corrected_bezier_so3
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
 
@@ -29,6 +30,7 @@ __all__ = [
     "projected_cubic_so3",
     "sample_quaternion",
     "sample_rotation",
+    "shoot",
     "show",
     "spline_velocities",
 ]
@@ -259,6 +261,58 @@ def minimum_acceleration_so3(
         raise RuntimeError(solution.message)
     sigma, w, acceleration, _ = np.moveaxis(solution.sol(t).reshape(4, 3, -1), -1, 1)
     return R0 @ exp_so3(sigma), w, acceleration
+
+
+def shoot(R0: Array, R1: Array, w0: Array, w1: Array, t: Array) -> tuple[Array, Array, Array, int]:
+    """Return R, w and w' of the optimum at the times t, and the number of corrections, by shooting.
+
+    Equation (20), w'' + w × w' = b, is integrated from t = 0. Newton's method corrects the six
+    unknowns w'(0) and b until R(1) and w(1) are right to 1e-10. The first values are those of
+    `corrected_bezier_so3`, with the mean of R w'', which is constant along an optimum. The method
+    may find a stationary curve that is not the cheapest.
+
+    If ‖w0‖ or ‖w1‖ is 3π or more, where the method seldom converges, a ValueError is raised. If 20
+    corrections do not suffice, a RuntimeError is raised.
+    Source: BK (20), BK 6.2.
+
+    Examples
+    --------
+    >>> R1, rest, t = exp_so3([0, 0, 1.5]), np.zeros(3), np.array([0, 0.5, 1])
+    >>> R, w, a, corrections = shoot(np.eye(3), R1, rest, rest, t)
+    >>> log_so3(R)[:, 2].round(9) + 0.0
+    array([0.  , 0.75, 1.5 ])
+    """
+    from scipy.integrate import solve_ivp
+
+    def motions(aims: Array, times: Array) -> tuple[Array, Array, Array]:
+        """Integrate the motions of several aims (w'(0), b), shape (K, 6), together."""
+        K = len(aims)
+
+        def rates(_: float, y: Array) -> Array:
+            R, w, a = np.split(y.reshape(K, 15), [9, 12], axis=1)
+            turning = R.reshape(K, 3, 3) @ hat_so3(w)
+            return np.hstack([turning.reshape(K, 9), a, aims[:, 3:] - np.cross(w, a)]).ravel()
+
+        fixed = np.tile(np.append(R0, w0), (K, 1))
+        start = np.hstack([fixed, aims[:, :3]]).ravel()
+        moved = solve_ivp(rates, (0, 1), start, "DOP853", t_eval=times, rtol=1e-12, atol=1e-13)
+        R, w, a = np.split(moved.y.T.reshape(-1, K, 15), [9, 12], axis=2)
+        return R.reshape(-1, K, 3, 3), w, a
+
+    guess, inside = corrected_bezier_so3(R0, R1, w0, w1), np.linspace(0.1, 0.9, 9)
+    constant = np.mean(guess(inside) @ guess(inside, 3)[..., None], axis=0)[:, 0]
+    aim = np.append(guess(0, 2), R0.T @ constant + np.cross(w0, guess(0, 2)))
+    for corrections in range(21):
+        nudged = aim + 1e-6 * np.eye(7, 6, -1)  # the aim, and one nudge of each unknown
+        R, w, _ = motions(nudged, np.ones(1))
+        missed, *others = np.hstack([log_so3(R1.T @ R[0]), w[0] - w1])
+        size = np.abs(missed).max()
+        if size < 1e-10:
+            R, w, a = motions(aim[None], t)
+            return R[:, 0], w[:, 0], a[:, 0], corrections
+        slopes = (np.transpose(others) - missed[:, None]) / 1e-6
+        aim = aim - np.linalg.solve(slopes, missed) * min(1, 0.5 / size)
+    raise RuntimeError(f"the motion misses its end by {size:.1g} after 20 corrections")
 
 
 def spline_velocities(times: Array, R: Array) -> Array:

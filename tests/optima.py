@@ -20,9 +20,8 @@ OPTIMA = {
     "torque": lambda R0, R1, w0, w1, G, *_: rb.minimum_torque_so3(R0, R1, w0, w1, G),
     "jerk": lambda R0, R1, w0, w1, _, a0, a1: rb.minimum_jerk_so3(R0, R1, w0, w1, a0, a1),
 }
-SOLVERS = OPTIMA | {"shooting": lambda *ends: rb.shoot_minimum_acceleration_so3(*ends[:4])}
 COSTS = {
-    **dict.fromkeys(("ball", "shooting"), lambda curve, _: rb.acceleration_cost(curve)),
+    "ball": lambda curve, _: rb.acceleration_cost(curve),
     "acceleration": lambda curve, G: rb.acceleration_cost(curve, G),
     "torque": lambda curve, G: rb.torque_cost(curve, G),
     "jerk": lambda curve, _: rb.jerk_cost(curve),
@@ -66,7 +65,7 @@ def times(A, x):
 
 def deviation(what, G, w, a, b=0):
     """Return u by an independent formula; the cost is the integral of ‖u‖²."""
-    if what in ("ball", "shooting", "jerk"):
+    if what in ("ball", "jerk"):
         return np.sqrt(2) * (b + np.cross(w, a) / 2 if what == "jerk" else a)
     torque = times(G, a) + np.cross(w, times(G, w))
     return torque if what == "torque" else times(np.linalg.cholesky(np.linalg.inv(G)).mT, torque)

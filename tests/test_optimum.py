@@ -1,5 +1,4 @@
-"""Compare the optima of two solvers with SciPy and direct minimisation, and test their
-equations."""
+"""Compare the optima with SciPy and direct minimisation, and test their equations."""
 
 import functools
 import re
@@ -14,7 +13,6 @@ from optima import (
     OPTIMA,
     PAPER,
     REST,
-    SOLVERS,
     deviation,
     random_problems,
     some,
@@ -44,15 +42,15 @@ def of_paper(case):
 @pytest.mark.parametrize(
     ("what", "problem"),
     [
-        *((what, of_paper(case)) for what in ("ball", "shooting") for case in PAPER),
+        *(("ball", of_paper(case)) for case in PAPER),
         *((what, some(FEW, i)) for what in ("acceleration", "torque", "jerk") for i in range(2)),
     ],
 )
 def test_solve_bvp_and_direct_minimisation_find_the_same_curve(what, problem):
     *ends, G, a0, a1 = problem
-    curve, tolerance = SOLVERS[what](*problem), 1e-8
+    curve, tolerance = OPTIMA[what](*problem), 1e-8
     ends += [a0, a1] * (what == "jerk")
-    if what in ("ball", "shooting"):
+    if what == "ball":
         theirs = oracles.minimum_acceleration(rb.log_so3(ends[1]), *ends[2:])
         nodes, weights = np.polynomial.legendre.leggauss(200)
         cost = weights @ np.sum(theirs.sol((nodes + 1) / 2)[7:10] ** 2, axis=0)
@@ -117,7 +115,7 @@ def test_a_round_body_has_the_optimum_of_a_ball(what, size):
 
 
 @pytest.mark.source("BK 6.2")
-@pytest.mark.parametrize("what", ["ball", "shooting", "acceleration", "torque"])
+@pytest.mark.parametrize("what", ["ball", "acceleration", "torque"])
 @pytest.mark.parametrize("shares", [(1, 1), (0, 0), (2, 0.5), (0, 3), (-0.3, 1.5)])
 def test_the_optimum_of_turns_about_a_principal_axis_is_a_cubic(what, shares):
     """All axes of a ball are principal axes."""
@@ -129,7 +127,7 @@ def test_the_optimum_of_turns_about_a_principal_axis_is_a_cubic(what, shares):
     for axis, moment in zip(frame.T, moments, strict=True):
         turn = angle * axis
         ends = R0, R0 @ rb.exp_so3(turn), j * turn, k * turn
-        curve = SOLVERS[what](*ends, (G + G.T) / 2)
+        curve = OPTIMA[what](*ends, (G + G.T) / 2)
         assert np.abs(curve(TIMES) - R0 @ rb.exp_so3(np.outer(p(TIMES), turn))).max() < 1e-11
         for order in (1, 2):
             assert np.abs(curve(TIMES, order) - np.outer(p(TIMES, order), turn)).max() < 1e-9
@@ -214,9 +212,9 @@ def test_single_problems_without_convergence_raise_an_error():
         assert np.isnan(values).all()
     with pytest.raises(ValueError, match=r"^guess: a curve is NaN, since it did not converge"):
         rb.stationary_so3(curve)
-    for what, speed in (*((what, 1) for what in SOLVERS), ("ball", 1e-10), ("ball", 1e148)):
+    for what, speed in (*((what, 1) for what in OPTIMA), ("ball", 1e-10), ("ball", 1e148)):
         with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iter") as failed:
-            SOLVERS[what](I3, R, *(speed * w), BOOK, REST, REST)
+            OPTIMA[what](I3, R, *(speed * w), BOOK, REST, REST)
         assert isinstance(failed.value, RuntimeError)
         assert failed.value.residual > 1e-11
         assert failed.value.iterations >= 0
@@ -254,9 +252,9 @@ def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkey
     assert np.abs(curves(TIMES) - good(TIMES))[:, 1:].max() < 1e-10
 
 
-@pytest.mark.parametrize("what", SOLVERS)
+@every_optimum
 def test_the_optimum_between_equal_rotations_at_rest_does_not_move(what):
-    curve = SOLVERS[what](I3, I3, REST, REST, BOOK, REST, REST)
+    curve = OPTIMA[what](I3, I3, REST, REST, BOOK, REST, REST)
     name = {"torque": "MinimumTorque", "jerk": "MinimumJerk"}.get(what, "MinimumAcceleration")
     assert f"{name} on SO(3)" in repr(curve)
     assert curve.cost == COSTS[what](curve, BOOK) == 0
@@ -264,10 +262,9 @@ def test_the_optimum_between_equal_rotations_at_rest_does_not_move(what):
     assert np.abs(curve(TIMES, 2)).max() < 1e-14
 
 
-@pytest.mark.parametrize("what", ["ball", "shooting"])
-def test_ends_rounded_to_eight_digits_are_replaced_by_rotations(what):
+def test_ends_rounded_to_eight_digits_are_replaced_by_rotations():
     _, R1, *rates = of_paper("4b")[:4]
-    rounded, exact = (SOLVERS[what](I3, R, *rates) for R in (R1.round(8), R1))
+    rounded, exact = (rb.minimum_acceleration_so3(I3, R, *rates) for R in (R1.round(8), R1))
     assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
     assert np.abs(rounded(TIMES) - exact(TIMES)).max() < 1e-7
 

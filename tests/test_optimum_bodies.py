@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
-from optima import BOOK, COSTS, I3, OPTIMA, REST, SOLVERS, bodies, deviation, random_problems, some
+from optima import BOOK, COSTS, I3, OPTIMA, REST, bodies, deviation, random_problems, some
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
@@ -23,7 +23,6 @@ ASTRAY += "2.12409307 -7.32863165 -2.12777328"
 # A key has an index of `MANY`, or else a rotation vector, velocities, and moments or accelerations.
 KNOWN = {
     f"ball {ASTRAY}": "502.348",
-    f"shooting {ASTRAY}": "502.348",
     "acceleration 79": "256.965743",  # found from a curve whose torque was reduced first
     "acceleration 654": "359.307210",
     "torque 565": "615.812105",  # found from a curve whose acceleration was reduced first
@@ -247,7 +246,7 @@ def test_the_cheapest_known_curve_is_found(case):
         turn, *others = vectors(numbers)
         problem = I3, rb.exp_so3(turn), *others[:2], np.diag(others[-1]), *others[-2:]
     least = pytest.approx(float(cost), abs=0.6 * 10.0 ** -len(cost.split(".")[1]))
-    assert SOLVERS[what](*problem).cost == least
+    assert OPTIMA[what](*problem).cost == least
 
 
 @pytest.mark.source("beyond BK 5")

@@ -48,6 +48,28 @@ def test_the_optima_agree_with_the_textbook(turn, w0, w1):
             assert np.abs(curve(TIMES, order) - want).max() < bound * max(1, np.abs(want).max())
 
 
+@pytest.mark.source("BK (20)", "BK 6.2", "BK Fig. 4", "BK Fig. 5")
+@pytest.mark.parametrize("case", PAPER)
+def test_shooting_reaches_the_optimum(case):
+    turn, w0, w1 = PAPER[case]
+    R0 = Rotation.random(rng=20).as_matrix()
+    ends = R0, R0 @ rb.exp_so3(turn), w0, w1
+    best = rb.minimum_acceleration_so3(*ends)
+    *found, corrections = textbook.shoot(*ends, TIMES)
+    for order, values in enumerate(found):
+        assert np.abs(best(TIMES, order) - values).max() < 1e-9
+    assert 0 < corrections < 5
+
+
+def test_shooting_says_when_it_fails():
+    R1, slow, fast = rb.exp_so3([0, 0, 1]), np.array([9.4, 0, 0]), np.array([0, 3 * np.pi, 0])
+    for name, w in (("w0", (fast, slow)), ("w1", (slow, fast))):
+        with pytest.raises(ValueError, match=f"^{name}: a norm below 3π is wanted, got 9.425"):
+            textbook.shoot(np.eye(3), R1, *w, TIMES)
+    with pytest.raises(RuntimeError, match=r"^the motion misses its end by \S+ after 20"):
+        textbook.shoot(np.eye(3), R1, slow, slow[[1, 0, 2]], TIMES)
+
+
 def test_an_optimum_that_is_not_found_raises_an_error(monkeypatch):
     failed = SimpleNamespace(success=False, message="too many nodes")
     monkeypatch.setattr(integrate, "solve_bvp", lambda *_, **__: failed)

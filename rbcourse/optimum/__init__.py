@@ -72,7 +72,7 @@ def minimum_acceleration_so3(
     See Also
     --------
     rbcourse.textbook.minimum_acceleration_so3 : The equation, solved by SciPy's `solve_bvp`.
-    shoot_minimum_acceleration_so3 : The same optimum by shooting.
+    rbcourse.textbook.shoot : The same optimum by shooting.
     corrected_bezier_so3, excess_estimate : A near-optimal formula; an estimate of the excess.
 
     Notes
