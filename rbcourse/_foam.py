@@ -20,10 +20,9 @@ Arrays have the shape (3, 3, N). For few matrices, the SVD is faster (see `rbcou
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._numerics import Array, at_cache_line, blocks, scaled
+from rbcourse._numerics import BLOCK, Array, blocks, scaled
 
 LEAST_ZETA = 3e-3  # in units of s₁ ‖M‖²; for smaller ζ, the result loses digits
-_BLOCK = 5128  # number of matrices that fit into the cache; multiples of 512 cause conflicts
 
 
 def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
@@ -38,9 +37,9 @@ def nearest_rotations(M: Array, R: Array) -> NDArray[np.bool_]:
     """
     count = M.shape[-1]
     right = np.zeros(count, bool)
-    workspace = at_cache_line(3, 3, 3, min(count, _BLOCK))
+    workspace = np.empty((3, 3, 3, min(count, BLOCK)))
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        for part in blocks(count, _BLOCK):
+        for part in blocks(count):
             of_block, X, C = workspace[..., : part.stop - part.start]
             of_block[...] = M[..., part]
             right[part] = _project(of_block, X, C)

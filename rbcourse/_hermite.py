@@ -1,6 +1,5 @@
 """Hermite interpolation by polynomials of degree one, three and five."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,21 +21,13 @@ def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Arra
     return _sum(_weights(len(ends), t, check_order(order, 3)), _terms(ends))
 
 
-def hermite_stack(terms: Array, t: Array, order: int, *, by_curve: bool = False) -> Array:
+def hermite_stack(terms: Array, t: Array, order: int) -> Array:
     """Evaluate `hermite` for a stack of ends, given the result of `stack_terms`.
 
-    The terms have the shape (n + 1, ..., count). If t has the shape (T, count) or (T, 1), the
-    result has the shape (..., T, count). If `by_curve`, t has the shape (count, T) or (1, T), and
-    the result has the shape (..., count, T).
+    The terms have the shape (n + 1, ..., count), and t the shape (T, count) or (T, 1). The result
+    has the shape (..., T, count).
     """
-    weights = _weights(len(terms) - 1, t, order)
-    if not by_curve:
-        return _sum(weights, terms[..., None, :])
-    core, count = terms.shape[1:-1], terms.shape[-1]
-    flat = terms[-len(weights) :].reshape(len(weights), math.prod(core), count)
-    sums = np.empty((math.prod(core), count, t.shape[1]))
-    np.matmul(flat.T, np.stack(weights, axis=1), out=np.moveaxis(sums, 1, 0))
-    return sums.reshape(*core, count, t.shape[1])
+    return _sum(_weights(len(terms) - 1, t, order), terms[..., None, :])
 
 
 def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:

@@ -1,6 +1,5 @@
-"""Numerical tools: ratios near zero, scaling by powers of two, blocks that fit into the cache."""
+"""Numerical tools: ratios near zero, products, scaling by powers of two, blocks, progress."""
 
-import math
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.floating[Any]]
 EPS = float(np.finfo(np.float64).eps)
+BLOCK = 5000  # matrices that are computed together, which bounds the memory for workspaces
 Item = TypeVar("Item")
 
 
@@ -44,7 +44,7 @@ def scaled(matrix: Array, axis: int | tuple[int, int] = (-2, -1)) -> Array:
     return np.ldexp(matrix, -exponent)
 
 
-def blocks(count: int, size: int) -> Iterator[slice]:
+def blocks(count: int, size: int = BLOCK) -> Iterator[slice]:
     """Yield slices that divide `count` items into parts of at most `size`."""
     for start in range(0, count, size):
         yield slice(start, min(start + size, count))
@@ -58,10 +58,3 @@ def reported(work: str, items: Sequence[Item]) -> Iterator[Item]:
             print(f"{work}: {number / len(items):.0%}", file=sys.stderr, flush=True)
             due = time.monotonic() + 5
         yield item
-
-
-def at_cache_line(*shape: int) -> Array:
-    """Return an uninitialised array that is aligned to a cache line."""
-    raw = np.empty(8 * math.prod(shape) + 64, np.uint8)
-    start = -raw.ctypes.data % 64
-    return raw[start : start + 8 * math.prod(shape)].view(np.float64).reshape(shape)

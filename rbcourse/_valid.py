@@ -15,7 +15,6 @@ from rbcourse._numerics import Array, blocks
 from rbcourse.projection import nearest
 
 ACCEPTED, REMOVED = 1e-9, 1e-6
-_BLOCK = 5128  # matrices that fit into the cache
 _LAST_ROW = np.array([0.0, 0, 0, 1])
 
 
@@ -98,7 +97,7 @@ def _deviations(R: Array) -> NDArray[np.float64]:
     rotation. Its diagonal vanishes only if E does.
     """
     found = np.empty(len(R))
-    for part in blocks(len(R), _BLOCK):
+    for part in blocks(len(R)):
         M = np.ascontiguousarray(R[part].transpose(1, 2, 0))
         C = np.empty_like(M)
         with np.errstate(over="ignore", invalid="ignore"):

@@ -415,10 +415,9 @@ class QuaternionCubic(NormalizedCubic):
     (...). If the margin is 0, the nearest unit quaternion is not unique.
     """
 
-    def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
-        size = np.expand_dims(np.abs(self._first).max(axis=(0, 1)), -1 if by_curve else -2)
-        lost = np.abs(Q).max(axis=0) < 8 * EPS * size
-        check_defined(t, lost, "the cubic of quaternions is zero", by_curve=by_curve)
+    def _check(self, Q: Array, t: Array) -> None:
+        lost = np.abs(Q).max(axis=0) < 8 * EPS * np.abs(self._first).max(axis=(0, 1))
+        check_defined(t, lost, "the cubic of quaternions is zero")
 
     @property
     def margin(self) -> Array:

@@ -21,12 +21,11 @@ from rbcourse._checks import (
     check_order,
 )
 from rbcourse._hermite import hermite
-from rbcourse._numerics import Array, blocks, cross
+from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
 from rbcourse._valid import as_rotations
 from rbcourse.so3 import hat, log
 
-BLOCK = 5128  # number of rotations evaluated together, as in `rbcourse._foam`
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
 AnyCurve = TypeVar("AnyCurve", bound="Curve")
 
@@ -314,17 +313,13 @@ class QuaternionCurve(Curve):
 
     def values(self, t: Array, order: int) -> Array:
         """Return the start rotation times the rotation of Q, or a derivative."""
-        by_curve = len(t) > self.count  # put the longer axis last
-        t, axis = (t.T, -1) if by_curve else (t, -2)
-        Q = self.quaternion(np.expand_dims(self._first, axis), t, order)
-        self._check(Q[0], t, by_curve)
+        Q = self.quaternion(self._first[..., None, :], t, order)
+        self._check(Q[0], t)
         if order:
-            values = np.moveaxis(angular_velocity(Q), 0, -1)
-        else:
-            values = rotation(multiply(np.expand_dims(self.start.T, axis), Q[0]))
-        return values.swapaxes(0, 1) if by_curve else values
+            return np.moveaxis(angular_velocity(Q), 0, -1)
+        return rotation(multiply(self.start.T[:, None], Q[0]))
 
-    def _check(self, Q: Array, t: Array, by_curve: bool) -> None:
+    def _check(self, Q: Array, t: Array) -> None:
         """Raise SingularTime if Q is 0 up to rounding at one of the times."""
 
     @cached_property
@@ -500,17 +495,11 @@ def which_curve(curve: int, batch_shape: tuple[int, ...]) -> str:
     return f" of curve {index}" if index else ""
 
 
-def check_defined(
-    t: Array, lost: NDArray[np.bool_], reason: str, *, by_curve: bool = False
-) -> None:
-    """Raise `SingularTime` for the first time at which `lost` is True, if there is one.
-
-    `t` and `lost` have the shape (T, count) or, if `by_curve`, (count, T).
-    """
+def check_defined(t: Array, lost: NDArray[np.bool_], reason: str) -> None:
+    """Raise `SingularTime` for the first time at which a curve is `lost`, shape (T, count)."""
     if lost.any():
-        place = tuple(np.argwhere(lost)[0])
-        curve = place[0] if by_curve else place[1]
-        raise SingularTime(float(np.broadcast_to(t, lost.shape)[place]), int(curve), reason)
+        time, curve = np.argwhere(lost)[0]
+        raise SingularTime(float(np.broadcast_to(t, lost.shape)[time, curve]), int(curve), reason)
 
 
 def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:

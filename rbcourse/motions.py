@@ -51,9 +51,7 @@ class RigidMotion(Curve):
 
     def values(self, t: Array, order: int) -> Array:
         """Return the pose, or (w, Rᵀ d'), or (w', Rᵀ d''), where d is the origin's position."""
-        by_curve = len(t) > self.count  # put the longer axis last
-        d = hermite_stack(self._terms, t.T if by_curve else t, order, by_curve=by_curve)
-        d = d.T if by_curve else np.moveaxis(d, 0, -1)
+        d = np.moveaxis(hermite_stack(self._terms, t, order), 0, -1)
         R = self.rotation.values(t, 0)
         values = np.empty((len(t), self.count, *self._core(order)))
         if order == 0:

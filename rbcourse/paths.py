@@ -18,10 +18,10 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import EPS, Array, blocks, matvec
+from rbcourse._numerics import BLOCK, EPS, Array, blocks, matvec
 from rbcourse._valid import as_poses, as_rotations
 from rbcourse.closed_forms import quaternion_cubic_so3
-from rbcourse.curves import BLOCK, Curve, SingularTime
+from rbcourse.curves import Curve, SingularTime
 from rbcourse.motions import RigidMotion, projected_cubic_se3, rigid_motion
 from rbcourse.projected_cubic import projected_cubic_so3, weighted_cubic_so3
 from rbcourse.velocities import (

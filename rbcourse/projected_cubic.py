@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
-from rbcourse._numerics import Array, blocks, cross
+from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse.curves import (
-    BLOCK,
     Curve,
     Ends,
     check_defined,
@@ -47,15 +46,13 @@ class ProjectedPolynomial(Curve):
 
     def values(self, t: Array, order: int) -> Array:
         """Return R, w, w' or w'' of the projection of M."""
-        by_curve = len(t) > self.count  # put the longer axis last
-        t = t.T if by_curve else t
-        M = [hermite_stack(self._terms, t, k, by_curve=by_curve) for k in range(order + 1)]
+        M = [hermite_stack(self._terms, t, k) for k in range(order + 1)]
         R, unique = nearest(np.moveaxis(M[0], (0, 1), (-2, -1)))
-        check_defined(t, ~unique, NOT_UNIQUE, by_curve=by_curve)
-        if order:
-            R = np.ascontiguousarray(np.moveaxis(R, (-2, -1), (0, 1)))
-            R = np.moveaxis(_rates(R, *M)[order - 1], 0, -1)
-        return R.swapaxes(0, 1) if by_curve else R
+        check_defined(t, ~unique, NOT_UNIQUE)
+        if order == 0:
+            return R
+        R = np.ascontiguousarray(np.moveaxis(R, (-2, -1), (0, 1)))
+        return np.moveaxis(_rates(R, *M)[order - 1], 0, -1)
 
     @cached_property
     def _terms(self) -> Array:

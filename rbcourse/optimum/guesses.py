@@ -11,14 +11,13 @@ from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, matvec
 from rbcourse.curves import Ends
 from rbcourse.optimum.chebyshev import along, chebyshev, grid
-from rbcourse.optimum.collocation import cayley
+from rbcourse.optimum.collocation import TOGETHER, cayley
 from rbcourse.optimum.functionals import Functional
 from rbcourse.so3 import exp_so3, hat, log, vee
 
 FAST = 4 * np.pi  # if ‖w0‖ + ‖w1‖ is larger, all four of the `starts` are used
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
-_TOGETHER = 32  # number of curves that take a step together, so that they fit into the cache
 
 
 def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp], Array]:
@@ -223,7 +222,7 @@ def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> 
     R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
     for _ in range(steps):
         before = cost[active]
-        for part in blocks(len(active), _TOGETHER):
+        for part in blocks(len(active), TOGETHER):
             index = active[part]
             R[index], cost[index] = _lower(functional.take(index), R[index], cost[index])
         active = active[cost[active] < (1 - worthwhile) * before]

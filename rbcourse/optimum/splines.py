@@ -35,6 +35,7 @@ from rbcourse.optimum.collocation import (
     EXACT,
     LONGEST_STEP,
     NODES,
+    TOGETHER,
     Arrays,
     BallStationary,
     Equations,
@@ -533,7 +534,7 @@ def _linearised(
     """Return the linear system of a Newton step, and the responses of the legs' unknowns."""
     m, count = problem.functional.ends, len(problem.h)
     made = []
-    for some in blocks(count, legs.together):
+    for some in blocks(count, TOGETHER):
         own, data = (tuple(x[some] for x in arrays) for arrays in (unknowns, parts))
         made.append(legs.take(some).responses(own, data, by_ends=True))
     responses = tuple(np.concatenate(x) for x in zip(*made, strict=True))

@@ -10,6 +10,7 @@ from sweeps import made, notice, points, read_off, reads, sweep, tell
 
 import rbcourse as rb
 from rbclassroom.explorers.paths import ANGLES, POSES, SHARES
+from rbcourse.draw.save import FORMS
 
 TIMES = np.linspace(0, 1, 61)
 BOOK = np.array([0.20, 0.13, 0.03])
@@ -248,7 +249,7 @@ def test_a_new_axis_restarts_the_motion():
 
 
 NAMES = "projection", "exponential", "Bézier", "corrected", "cumulative", "quaternion", "Cayley"
-RIVALS = dict(zip(NAMES, rb.CLOSED_FORMS.values(), strict=True))
+RIVALS = dict(zip(NAMES, FORMS.values(), strict=True))
 KNOWN = {}
 
 
