@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rbcourse.bezier import bezier_deviation, seen_from_the_middle
 from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.second_variation import polynomials
 
@@ -110,14 +109,6 @@ def deviation(s, e, d, n):
         -2 * ese / 180 + 17 * ded / 30240,
         30 * eed / 15120,
     ]
-
-
-def test_the_deviation_agrees_with_the_package_on_so3():
-    sigma, w0, w1 = np.random.default_rng(1).normal(size=(3, 3))
-    e, d = seen_from_the_middle(sigma, w0, w1)
-    ours = bezier_deviation(sigma, e, d)
-    for mine, other in zip(ours, deviation(as_so3(sigma), as_so3(e), as_so3(d), 3), strict=True):
-        assert as_so3(mine) == pytest.approx(other, abs=1e-14)
 
 
 def as_so3(x):

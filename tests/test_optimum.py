@@ -160,24 +160,6 @@ def test_reversed_ends_reverse_the_optimum(what):
     assert tripled.c == pytest.approx(factor * curves.c, rel=1e-9)
 
 
-@pytest.mark.source("BK 6.2")
-@every_optimum
-def test_a_stack_gives_the_same_optima_as_single_problems(what):
-    problems = random_problems(6, 39, 2.0, 5.0)
-    problems[4][2] = 0.7 * I3
-    stack = OPTIMA[what](*(x.reshape(2, 3, *x.shape[1:]) for x in problems))
-    alone = [OPTIMA[what](*some(problems, i)) for i in range(6)]
-    assert all(type(one.cost) is float and one.converged is True for one in alone)
-    assert stack.iterations.shape == (2, 3)
-    assert stack.cost == pytest.approx(np.reshape([one.cost for one in alone], (2, 3)), rel=1e-10)
-    R = stack(TIMES)
-    assert np.abs(R.mT @ R - I3).max() < 20 * np.finfo(float).eps
-    for order in range(4):
-        values = stack(TIMES, order)
-        want = np.stack([one(TIMES, order) for one in alone], axis=1).reshape(values.shape)
-        assert np.abs(values - want).max() < 1e-10 * (1 + np.abs(values).max())
-
-
 @pytest.mark.parametrize(("what", "speed"), [*((what, 1e160) for what in OPTIMA), ("ball", 1e3)])
 def test_a_problem_without_convergence_does_not_affect_the_others(what, speed):
     problems = random_problems(6, 41, 2.0, 4.0)
@@ -260,13 +242,6 @@ def test_the_optimum_between_equal_rotations_at_rest_does_not_move(what):
     assert curve.cost == COSTS[what](curve, BOOK) == 0
     assert np.abs(curve(TIMES) - I3).max() < 1e-14
     assert np.abs(curve(TIMES, 2)).max() < 1e-14
-
-
-def test_ends_rounded_to_eight_digits_are_replaced_by_rotations():
-    _, R1, *rates = of_paper("4b")[:4]
-    rounded, exact = (rb.minimum_acceleration_so3(I3, R, *rates) for R in (R1.round(8), R1))
-    assert np.abs(rounded(1) - rb.project_so(R1.round(8))).max() < 1e-10
-    assert np.abs(rounded(TIMES) - exact(TIMES)).max() < 1e-7
 
 
 def test_the_nodes_do_not_depend_on_the_threads_of_blas():

@@ -85,21 +85,6 @@ def test_the_cubic_with_the_ends_of_the_projected_line_equals_this_line():
             assert np.abs(curve(TIMES, order) - line(TIMES, order)).max() < 1e-13
 
 
-@pytest.mark.source("BK Prop. 3", "BK Prop. 5")
-def test_moved_ends_give_the_moved_curve():
-    """The ends are multiplied by rotations from both sides. The documented bound is 1e-12 divided
-    by the margin."""
-    L, Q = Rotation.random(2, rng=5).as_matrix()
-    ends, rates = (L @ R0 @ Q, L @ R1 @ Q), np.array([W0, W1, B0, B1]) @ Q
-    for moved, curve, want in (
-        (rb.projected_cubic_so3(*ends, *rates[:2]), CUBICS, L @ CUBICS(TIMES) @ Q),
-        (rb.projected_quintic_so3(*ends, *rates), QUINTICS, L @ QUINTICS(TIMES) @ Q),
-        (rb.projected_cubic_so3(R1, R0, -W1, -W0), CUBICS, CUBICS(1 - TIMES)),
-    ):
-        off = np.abs(moved(TIMES) - want).max(axis=(0, -2, -1))
-        assert np.all(off < 1e-12 / np.minimum(curve.margin, 1))
-
-
 def test_the_margin_is_the_least_gap():
     t = np.linspace(0, 1, 1001)
     gap, steps = gaps(t).min(axis=0), np.diff(cubic_of_matrices(t), axis=0)
