@@ -1,0 +1,246 @@
+"""Compare times with other packages: ``.venv/bin/python benchmarks/benchmarks.py``.
+
+Each function of a task prepares N items, and yields methods that do the same with them, ours first.
+The run takes about ten minutes, and writes the CSV, the figure and the README's table.
+"""
+
+import csv
+import io
+import os
+import platform
+import re
+from decimal import ROUND_DOWN, Context
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from timeit import Timer, default_timer
+
+import matplotlib.pyplot as plt
+import numpy as np
+from pytransform3d.batch_rotations import matrices_from_quaternions, quaternion_slerp_batch
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline, Slerp
+
+import rbcourse as rb
+from rbclassroom.figures import FORMS
+from rbcourse import textbook
+from rbcourse.files import replace_file
+
+try:
+    import roma
+    import toppra
+    import torch
+    from toppra import algorithm, constraint, interpolator
+except ImportError:
+    roma = toppra = torch = None
+
+OURS, MOMENTS = "rbcourse", np.linspace(0, 1, 101)
+ALONG, E1 = np.pi / 6 * np.array([1, 2, 3]), np.array([1.0, 0, 0])
+ENDS = {  # the boundary conditions of the figures of BK
+    case: (np.eye(3), rb.exp_so3(ALONG), ALONG, ALONG + k * E1)
+    for case, k in (("4a", 0), ("4b", 1), ("4c", 5))
+}
+ENDS["5"] = np.eye(3), rb.exp_so3(np.pi / 6 * np.array([1, 4, 3])), [1.0, 2, 3], [2.0, 1, 1]
+
+
+def nearest_rotation(n, rng):
+    """Find the rotations nearest to n noisy matrices with det > 0."""
+    M = rb.sample_rotation(n, rng=rng) + 0.1 * rng.standard_normal((n, 3, 3))
+    M[np.linalg.det(M) <= 0] *= -1
+    yield OURS, lambda: rb.project_so(M)
+    yield "textbook", lambda: textbook.project_so(M)
+    yield "SciPy", lambda: Rotation.from_matrix(M).as_matrix()
+    yield "NumPy, SVD alone", lambda: np.linalg.svd(M).U
+    if roma:
+        tensor = torch.from_numpy(M)
+        yield "RoMa", lambda: roma.special_procrustes(tensor)
+
+
+def geodesic(n, rng):
+    """Evaluate a geodesic at n times; making the curve is not timed."""
+    R0, t = rb.sample_rotation(rng=rng), rng.random(n)
+    R1 = R0 @ rb.exp_so3([1, -1, 1.5])
+    ours, both = rb.geodesic_so3(R0, R1), Rotation.from_matrix([R0, R1])
+    theirs, xyzw = Slerp([0, 1], both), both.as_quat()
+    batch = partial(quaternion_slerp_batch, *np.roll(xyzw, 1, axis=1), t, shortest_path=True)
+    yield OURS, lambda: ours(t)
+    yield "textbook", lambda: textbook.geodesic_so3(R0, R1, t)
+    yield "SciPy", lambda: theirs(t).as_matrix()
+    yield "SciPy, as Rotation", lambda: theirs(t)
+    yield "pytransform3d", lambda: matrices_from_quaternions(batch())
+    yield "pytransform3d, as quaternions", batch
+    if roma:
+        slerp = partial(roma.unitquat_slerp, *map(torch.from_numpy, (*xyzw, t)))
+        yield "RoMa", lambda: roma.unitquat_to_rotmat(slerp())
+        yield "RoMa, as quaternions", slerp
+
+
+def projected_cubic(n, rng, orders):
+    """Evaluate a projected cubic, with velocity and acceleration if `orders` is 3, at n times."""
+    t, (R0, R1, w0, w1), knots = rng.random(n), ENDS["5"], np.linspace(0, 1, 5)
+    ours, theirs = rb.projected_cubic_so3(*ENDS["5"]), textbook.projected_cubic_so3
+    spline = RotationSpline(knots, Rotation.from_matrix(ours(knots)))
+    cubic = textbook.cubic_coefficients(R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1))
+
+    def by_textbook():
+        if orders > 1:
+            return theirs(*ENDS["5"], t)
+        return [textbook.project_so(textbook.polynomial(cubic, t[:, None, None]))]
+
+    yield OURS, lambda: [ours(t, k) for k in range(orders)]
+    yield "textbook", by_textbook
+    yield "SciPy, another curve", lambda: [spline(t), *(spline(t, k) for k in range(1, orders))]
+
+
+def closed_forms(n, rng, orders):
+    """Evaluate curves of closed forms with the same ends, and their derivatives, at n times."""
+    t = rng.random(n)
+    for form, make in FORMS.items():
+        curve, name = make(*ENDS["5"]), OURS if form == "projection" else f"rbcourse, {form}"
+        yield name, partial(lambda curve: [curve(t, order) for order in range(orders)], curve)
+
+
+def random_samples(n, rng, kind, form, name):
+    """Sample n matrices or unit quaternions."""
+    convert = getattr(Rotation, f"as_{form}")
+    yield OURS, lambda: getattr(rb, f"sample_{kind}")(n, rng=rng)
+    yield "textbook", lambda: getattr(textbook, f"sample_{kind}")(n, rng)
+    yield "SciPy", lambda: convert(Rotation.random(n, rng=rng))
+    yield "SciPy, as Rotation", lambda: Rotation.random(n, rng=rng)
+    if roma:
+        yield "RoMa", partial(getattr(roma, name), n, dtype=torch.float64)
+
+
+def chain_of_poses(n, rng, leg):
+    """Evaluate a chain of 1,000 poses at n increasing times; making the chain is not timed."""
+    when, places = np.cumsum(rng.uniform(0.5, 1.5, 1000)), rng.normal(size=(1000, 3)).cumsum(0)
+    R, t = rb.exp_so3(rng.normal(0, 0.5, (1000, 3)).cumsum(0)), np.linspace(when[0], when[-1], n)
+    motion = rb.chain(when, rb.pose_from_components(R, places), leg=leg)
+    turning, path = RotationSpline(when, Rotation.from_matrix(R)), CubicSpline(when, places)
+    yield OURS, lambda: motion(t)
+    yield "SciPy, another curve", lambda: (turning(t).as_matrix(), path(t))
+
+
+def fastest_timing(n, rng):
+    """Find the fastest timing of one leg, with limits for each component of the acceleration."""
+    A1, s = rb.exp_se3([0.6, -0.4, 0.5, 0.3, 0.7, -0.2]), np.linspace(0, 1, 1001)
+    leg = rb.geodesic_se3(np.eye(4), A1)
+    yield OURS, lambda: rb.fastest(leg, angular_acceleration=3 * [4], acceleration=3 * [3]).duration
+
+    def by_toppra():
+        solver = algorithm.TOPPRA([limits], Leg(), gridpoints=s, solver_wrapper="seidel")
+        rate = solver.compute_parameterization(0, 0)[1]
+        return np.sum(2 / 1000 / (rate[1:] + rate[:-1]))
+
+    if toppra:
+        limits = constraint.JointAccelerationConstraint(np.outer([4, 4, 4, 3, 3, 3], [-1, 1]))
+
+        class Leg(interpolator.AbstractGeometricPath):
+            dof, path_interval = 6, np.array([0.0, 1.0])
+
+            def __call__(self, s, order=0):
+                return leg(s, order) if order else np.zeros((len(s), 6))
+
+        yield "toppra", by_toppra
+
+
+def one_optimum(n, rng, case):
+    """Solve one problem of the paper (BK), and compute 101 rotations; textbook uses `solve_bvp`."""
+    yield OURS, lambda: rb.minimum_acceleration_so3(*ENDS[case])(MOMENTS)
+    yield "rbcourse, shooting", lambda: rb.shoot_minimum_acceleration_so3(*ENDS[case])(MOMENTS)
+    yield "rbcourse, projected cubic", lambda: rb.projected_cubic_so3(*ENDS[case])(MOMENTS)
+    yield "textbook", lambda: textbook.minimum_acceleration_so3(*ENDS[case], MOMENTS)[0]
+
+
+ALL, SOME = tuple(10**k for k in range(7)), (1, 1000, 10**6)
+TASKS = [  # the name of the task, the case, the numbers of items, and the function with its options
+    ("nearest rotation", "noisy", ALL, nearest_rotation),
+    ("geodesic at N times", "", ALL, geodesic),
+    ("projected cubic at N times", "", ALL, projected_cubic, 1),
+    ("projected cubic with derivatives", "", ALL, projected_cubic, 3),
+    ("random rotation matrices", "", ALL, random_samples, "rotation", "matrix", "random_rotmat"),
+    ("random quaternions", "", ALL, random_samples, "quaternion", "quat", "random_unitquat"),
+    ("closed forms at N times", "", SOME, closed_forms, 1),
+    ("closed forms with derivatives", "", SOME, closed_forms, 3),
+    ("chain at N times", "projected cubics", SOME, chain_of_poses, rb.projected_cubic_se3),
+    ("chain at N times", "geodesics", SOME, chain_of_poses, rb.geodesic_se3),
+    ("fastest timing", "one leg", (1,), fastest_timing),
+    *(("optimum, one problem", case, (1,), one_optimum, case) for case in ENDS),
+]
+
+COLUMNS = ("task", "case", "N [1]", "method", "time [s]", "time low [s]", "time high [s]")
+COLUMNS += ("times ours [1]", "times ours low [1]", "times ours high [1]", "rounds [1]", "machine")
+COLOURS = {OURS: "#0072B2", "textbook": "#000000", "SciPy": "#D55E00", "RoMa": "#009E73"}
+COLOURS |= {"pytransform3d": "#AA4499", "NumPy": "#777777"}
+
+
+def main(tasks=TASKS, folder=Path(__file__).parent, **options):
+    """Run tasks, print the results, and write them; `options` are those of `in_turn`."""
+    rows, rng, page = [], np.random.default_rng(), folder / "README.md"
+    for task, case, sizes, make, *given in tasks:
+        for n in sizes:
+            methods = dict(make(n, rng, *given))
+            times = in_turn(list(methods.values()), **options)
+            spreads = np.percentile([times, times / times[:, :1]], [50, 25, 75], axis=1)
+            for name, spread in zip(methods, spreads.T, strict=True):
+                numbers = [f"{x:.4g}" for x in spread.ravel()]
+                rows.append([task, case, str(n), name, *numbers, len(times), machine()])
+                print(f"{task}, N = {n}: {name} {numbers[0]} s, {numbers[3]} × ours", flush=True)
+    csv.writer(text := io.StringIO(), lineterminator="\n").writerows([COLUMNS, *rows])
+    replace_file(folder / "benchmarks.csv", text.getvalue().encode())
+    rows = [dict(zip(COLUMNS, row, strict=True)) for row in rows]
+    before, _, after = re.split("(?<=<!-- benchmarks -->\n)|(?=<!-- end)", page.read_text("utf-8"))
+    replace_file(page, (before + table(rows) + after).encode())
+    draw(rows).savefig(picture := io.BytesIO(), metadata={"Software": None})
+    replace_file(folder / "benchmarks.png", picture.getvalue())
+
+
+def in_turn(calls, rounds=9, clock=default_timer):
+    """Return the seconds per call, shape (rounds, calls); each round runs every call."""
+    timers = [Timer(call, timer=clock) for call in calls]
+    pairs = [(timer, timer.autorange()[0]) for timer in timers]
+    return np.array([[timer.timeit(n) / n for timer, n in pairs] for _ in range(rounds)])
+
+
+def machine():
+    """Return the processor, the number of its threads, and the versions of the packages."""
+    file, names = Path("/proc/cpuinfo"), ["numpy", "scipy", "pytransform3d"]
+    known = re.search(r"model name\s*: (.*)", file.read_text() if file.exists() else "")
+    processor = known[1] if known else platform.machine()
+    versions = [f"{x} {version(x)}" for x in names + ["roma", "torch", "toppra"] * bool(roma)]
+    return "; ".join([processor, f"{os.cpu_count()} threads", *versions])
+
+
+def table(rows):
+    """Return the README's table: for the largest N, times divided by ours and rounded down."""
+    text = "\n| task | time divided by ours |\n|---|---|\n"
+    for task, case, sizes, *_ in TASKS:
+        told, wanted = [], [task, case, str(sizes[-1])]
+        for row in (row for row in rows if [row[x] for x in COLUMNS[:3]] == wanted):
+            ratio = Context(prec=2, rounding=ROUND_DOWN).create_decimal(row["times ours [1]"])
+            told.append(f"{ratio:f} × {row['method']}")
+        text += f"| {task}{case and ', '}{case}, N = {sizes[-1]:,} | {'; '.join(told[1:])} |\n"
+    return text + "\n"
+
+
+def draw(rows):
+    """Return a figure of the time for each item against N."""
+    with plt.style.context(["default", "rbcourse.rbcourse"]):
+        fig, axes = plt.subplots(3, 2, figsize=(9, 12))
+        for ax, task in zip(axes.flat, dict.fromkeys(row["task"] for row in rows), strict=False):
+            here = [row for row in rows if row["task"] == task]
+            for name in dict.fromkeys(row["method"] for row in here):
+                mine = [row for row in here if row["method"] == name]
+                n, time = np.array([[float(row[x]) for x in COLUMNS[2:5:2]] for row in mine]).T
+                author, *more = name.split(",")
+                look = {"color": COLOURS[author], "lw": 4 if name == OURS else 1.5}
+                ax.plot(n, 1e6 * time / n, "o:" if more else "o-", label=name, **look)
+            ax.set(xscale="log", yscale="log", title=task, xlabel="N", ylabel="µs for each")
+        lines = {line.get_label(): line for ax in axes.flat for line in ax.lines}
+        fig.legend(handles=lines.values(), loc="outside lower center", ncols=3)
+    return fig
+
+
+if __name__ == "__main__":
+    plt.switch_backend("Agg")
+    main()
