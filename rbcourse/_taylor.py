@@ -84,14 +84,20 @@ def cross(x: Jet, y: Jet) -> Jet:
 
 def matrix(q: Array, scale: float | Array = 1.0) -> Array:
     """Return `scale` ‖q‖² times the rotation matrix of q, shape (..., 3, 3)."""
-    w, x, y, z = q
-    sw, sx, sy, sz = scale * w, scale * x, scale * y, scale * z
-    ww, xx, yy, zz = sw * w, sx * x, sy * y, sz * z
-    xy, xz, yz, wx, wy, wz = sx * y, sx * z, sy * z, sw * x, sw * y, sw * z
-    R = np.empty((*w.shape, 3, 3))
-    R[..., 0, 0], R[..., 0, 1], R[..., 0, 2] = ww + xx - yy - zz, 2 * (xy - wz), 2 * (xz + wy)
-    R[..., 1, 0], R[..., 1, 1], R[..., 1, 2] = 2 * (xy + wz), ww - xx + yy - zz, 2 * (yz - wx)
-    R[..., 2, 0], R[..., 2, 1], R[..., 2, 2] = 2 * (xz - wy), 2 * (yz + wx), ww - xx - yy + zz
+    x, y, z = q[1:]
+    ww, wx, wy, wz = scale * q[0] * q
+    xx, xy, xz = scale * x * q[1:]
+    yy, yz = scale * y * q[2:]
+    zz = scale * z * z
+    rows = (
+        (ww + xx - yy - zz, 2 * (xy - wz), 2 * (xz + wy)),
+        (2 * (xy + wz), ww - xx + yy - zz, 2 * (yz - wx)),
+        (2 * (xz - wy), 2 * (yz + wx), ww - xx - yy + zz),
+    )
+    R = np.empty((*x.shape, 3, 3))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            R[..., i, j] = entry
     return R
 
 

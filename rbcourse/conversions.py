@@ -205,10 +205,13 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
     >>> quaternion_from_zyx([np.pi, 0, 0]).round(12)
     array([0., 0., 0., 1.])
     """
-    half = as_finite("angles", angles, 3) / 2
-    (a, b, c), (sa, sb, sc) = np.moveaxis(np.cos(half), -1, 0), np.moveaxis(np.sin(half), -1, 0)
-    w, x = a * b * c + sa * sb * sc, a * b * sc - sa * sb * c
-    y, z = a * sb * c + sa * b * sc, sa * b * c - a * sb * sc
+    half = np.moveaxis(as_finite("angles", angles, 3), -1, 0) / 2
+    ca, cb, cc = np.cos(half)
+    sa, sb, sc = np.sin(half)
+    w = ca * cb * cc + sa * sb * sc
+    x = ca * cb * sc - sa * sb * cc
+    y = ca * sb * cc + sa * cb * sc
+    z = sa * cb * cc - ca * sb * sc
     return np.stack([w, x, y, z], axis=-1)
 
 
@@ -238,12 +241,15 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     array([1.5708, 1.5708, 0.    ])
     """
     w, x, y, z = np.moveaxis(as_unit_quaternions("q", q), -1, 0)
-    minus, plus = 2 * np.arctan2(z - x, w + y), 2 * np.arctan2(z + x, w - y)
+    minus = 2 * np.arctan2(z - x, w + y)  # α − γ
+    plus = 2 * np.arctan2(z + x, w - y)  # α + γ
     up, down = np.hypot(w + y, z - x), np.hypot(w - y, z + x)
-    lock_up, lock_down = down < 8 * EPS * up, up < 8 * EPS * down  # π/2 − |β| is twice the ratio
+    lock_up = down < 8 * EPS * up  # π/2 − |β| is twice the ratio
+    lock_down = up < 8 * EPS * down
     plus, minus = np.where(lock_up, minus, plus), np.where(lock_down, plus, minus)
+    alpha, gamma = _wrapped((plus + minus) / 2), _wrapped((plus - minus) / 2)
     beta = 2 * np.arctan2(up, down) - np.pi / 2
-    return np.stack([_wrapped((plus + minus) / 2), beta, _wrapped((plus - minus) / 2)], axis=-1)
+    return np.stack([alpha, beta, gamma], axis=-1)
 
 
 def _wrapped(angle: Array) -> Array:

@@ -60,8 +60,10 @@ class Ends(_Ends):
 
     def __new__(cls, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Self:
         """Check the arguments, and broadcast them to a common batch shape."""
-        R0, R1 = as_rotations("R0", R0), as_rotations("R1", R1)
-        w0, w1 = as_finite("w0", w0, 3), as_finite("w1", w1, 3)
+        R0 = as_rotations("R0", R0)
+        R1 = as_rotations("R1", R1)
+        w0 = as_finite("w0", w0, 3)
+        w1 = as_finite("w1", w1, 3)
         batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
         return cls._make((R0, R1, w0, w1)).broadcast_to(batch)
 

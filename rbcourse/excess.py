@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rbcourse._numerics import Array, blocks
-from rbcourse.cost import check_curve
+from rbcourse.cost import check_curve, summed
 from rbcourse.curves import Curve
 from rbcourse.optimum.chebyshev import grid, tails
 from rbcourse.optimum.second_variation import on_each_axis, polynomials, products
+from rbcourse.paths import smooth_parts
 from rbcourse.so3 import hat
 
 _NODES, _BUMPS = 33, 12
@@ -31,10 +32,11 @@ def excess_estimate(curve: Curve) -> Array:
     Returns
     -------
     ndarray, shape curve.batch_shape
-        An estimate of (cost of the curve)/(cost of the optimum) − 1. The estimate is NaN if the
-        curve reaches the `SPEED_LIMIT`, costs more than about twice the optimum, is not smooth
-        enough for 33 nodes (such as a `chain`), costs nothing, or is NaN itself. It is also NaN if
-        H (see the notes) is not positive definite.
+        An estimate of (cost of the curve)/(cost of the optimum) − 1. A `chain` is compared with the
+        optimal legs that have the same velocities at its poses; if its velocity jumps, RuntimeError
+        is raised. The estimate is NaN if the curve reaches the `SPEED_LIMIT`, costs more than about
+        twice the optimum, is not smooth enough for 33 nodes, costs nothing, or is NaN itself. It is
+        also NaN if the second variation is not positive definite.
 
     Notes
     -----
@@ -46,14 +48,8 @@ def excess_estimate(curve: Curve) -> Array:
     ‖w‖ reaches 3π/4, the optimum may turn the other way round; the estimate is then the excess over
     the nearby stationary curve.
 
-    Let J = ∫ ‖w'‖² dt. Let η be small, with η = η' = 0 at both ends. To second order, J of the
-    curve R exp(η̂) is J − 2 g · η + η · H η. With x = η' + w × η,
-
-        g · η = −∫ w' · x' dt,    η · H η = ∫ ‖x'‖² − w' · (η × x)' dt.
-
-    The least value over polynomials η is J − g · H⁻¹ g. The difference g · H⁻¹ g is the decrement
-    of a step of Newton's method. To leading order, it is ∫ ‖δ''‖² dt, where δ is the deviation from
-    the optimum.
+    The estimate is the decrement of one step of Newton's method for ∫ ‖w'‖² dt, over polynomials η
+    in R exp(η̂), divided by the cost that remains (docs/near_optimal.md, section 6).
 
     Examples
     --------
@@ -63,8 +59,9 @@ def excess_estimate(curve: Curve) -> Array:
     0.0197
     """
     check_curve(curve)
+    legs = smooth_parts(curve, "excess estimate", 1)
     t, _, integral, _ = grid(_NODES)
-    w, a = (np.moveaxis(curve.flat.values(t[:, None], order), 1, 0) for order in (1, 2))
+    w, a = (np.moveaxis(legs.flat.values(t[:, None], order), 1, 0) for order in (1, 2))
     left_out = ~(np.linalg.norm(w, axis=-1).max(axis=1) < SPEED_LIMIT)
     w[left_out], a[left_out] = 0, 0
     cost = np.sum(a**2, axis=-1) @ integral[-1]
@@ -73,12 +70,18 @@ def excess_estimate(curve: Curve) -> Array:
     for some in blocks(len(w), _TOGETHER):
         saved[some] = _decrement(w[some], a[some])
     saved[left_out | ~(saved <= cost / 2)] = np.nan
+    saved, cost = (summed(curve, x, legs, 3) for x in (saved, cost))
     with np.errstate(invalid="ignore"):  # 0/0
-        return (saved / (cost - saved)).reshape(curve.batch_shape)[()]
+        return saved / (cost - saved)
 
 
 def _decrement(w: Array, a: Array) -> Array:
-    """Return g · H⁻¹ g from w and w' at the nodes, (N, n, 3); NaN if H is not positive definite."""
+    """Return g · H⁻¹ g from w and w' at the nodes, (N, n, 3); NaN if H is not positive definite.
+
+    To second order, the cost of R exp(η̂) is J − 2 g · η + η · H η. With x = η' + w × η,
+
+        g · η = −∫ w' · x' dt,    η · H η = ∫ ‖x'‖² − w' · (η × x)' dt.
+    """
     eta, rate, bend = (on_each_axis(x, np.eye(3)) for x in polynomials(_BUMPS, 2, _NODES)[:3])
     W, A = hat(w), hat(a)
     x, x_rate = rate + W @ eta, bend + A @ eta + W @ rate

@@ -45,9 +45,12 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """
     M, atol = as_array("M", M, "n", "n"), as_tolerance("atol", atol)
     with np.errstate(over="ignore", invalid="ignore"):
-        defect = np.abs(np.swapaxes(M, -1, -2) @ M - np.eye(M.shape[-1])).max(axis=(-2, -1))
-        passes = (defect <= atol) & (np.abs(np.linalg.det(M) - 1) <= atol)
-    return (passes & np.isfinite(M).all(axis=(-2, -1)))[()]
+        gram = np.swapaxes(M, -1, -2) @ M
+        defect = np.abs(gram - np.eye(M.shape[-1])).max(axis=(-2, -1))
+        passes = defect <= atol
+        passes &= np.abs(np.linalg.det(M) - 1) <= atol
+    passes &= np.isfinite(M).all(axis=(-2, -1))
+    return passes[()]
 
 
 def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
@@ -73,17 +76,18 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """
     A, atol = as_array("A", A, "n+1", "n+1"), as_tolerance("atol", atol)
     with np.errstate(invalid="ignore"):
-        last_row = np.abs(A[..., -1, :] - np.eye(A.shape[-1])[-1]).max(axis=-1) <= atol
-    finite = np.isfinite(A).all(axis=(-2, -1))
-    return (is_so(A[..., :-1, :-1], atol) & last_row & finite)[()]
+        off = np.abs(A[..., -1, :] - np.eye(A.shape[-1])[-1])
+    passes = is_so(A[..., :-1, :-1], atol) & (off.max(axis=-1) <= atol)
+    passes &= np.isfinite(A).all(axis=(-2, -1))
+    return passes[()]
 
 
 def project_so(M: ArrayLike) -> Array:
     """Return the rotation R nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
 
-    RᵀM is symmetric, and the sum of its two smallest eigenvalues is at least 0. L M projects to L
-    R, and
-    M L to R L, for every rotation L. The paper prints U Vᵀ, which is a reflection if det M < 0.
+    RᵀM is symmetric, and the sum of its two smallest eigenvalues is at least 0. For every rotation
+    L, the projection of L M is L R, and that of M L is R L. The paper prints U Vᵀ, which is a
+    reflection if det M < 0.
     Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Parameters

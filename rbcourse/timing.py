@@ -280,10 +280,13 @@ class Timed(Curve):
         """Return s, s' and s'' at the times t."""
         t = as_time(t, 0, self.domain)
         i = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.s) - 2)
-        past, v = t - self.times[i], self.rate[i]
-        u = (self.rate[i + 1] ** 2 - v**2) / (self.s[i + 1] - self.s[i]) / 2
-        last = np.where(t < self.times[-1], np.nextafter(self.s[i + 1], -inf), self.s[-1])
-        return np.clip(self.s[i] + past * (v + past * u / 2), self.s[i], last), v + past * u, u
+        first, last = self.s[i], self.s[i + 1]
+        v = self.rate[i]
+        u = (self.rate[i + 1] ** 2 - v**2) / (last - first) / 2
+        past = t - self.times[i]
+        s = first + past * (v + past * u / 2)
+        below = np.where(t < self.times[-1], np.nextafter(last, -inf), self.s[-1])
+        return np.clip(s, first, below), v + past * u, u
 
     def evaluate(self, t: Array, order: int) -> Array:
         """Return the values at the times t, shape (T, 1), by the chain rule."""

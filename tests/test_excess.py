@@ -240,6 +240,15 @@ def test_estimates_do_not_depend_on_the_duration():
         assert rb.excess_estimate(one) == pytest.approx(estimate[1, 2], rel=1e-9)
 
 
+def test_a_chain_is_compared_with_optimal_legs():
+    t, R = [0, 1, 3], rb.exp_so3([[0, 0, 0], [0, 0.2, 0.5], [0.6, 0.2, 0.9]])
+    chain = rb.projected_spline_so3(t, R)
+    optimal = rb.chain(t, R, chain.velocities, leg=rb.minimum_acceleration_so3)
+    excess = rb.acceleration_cost(chain) / rb.acceleration_cost(optimal) - 1
+    assert rb.excess_estimate(chain) == pytest.approx(excess, rel=0.02)
+    assert abs(rb.excess_estimate(optimal)) < 1e-22
+
+
 def test_the_estimate_is_zero_for_an_optimum():
     best = rb.minimum_acceleration_so3(*random_problems(50, 0.6, rng=9))
     assert np.all(np.abs(rb.excess_estimate(best)) < 1e-22)

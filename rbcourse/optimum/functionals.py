@@ -160,8 +160,11 @@ class Effort:
         """Return the derivatives of p with respect to w, w' and w''."""
         G, M = self.G[:, None], self.M[:, None]
         W, H = hat(w), hat(matvec(G, w))
-        T0, T1 = W @ G - H, hat(a) @ G - hat(matvec(G, a))  # derivatives of τ, τ' with respect to w
-        V, GM, QM = hat(matvec(M, self.torque(w, a))), G @ M, (G @ W - H) @ M
+        V = hat(matvec(M, self.torque(w, a)))
+        T0 = W @ G - H  # the derivative of τ with respect to w
+        T1 = hat(a) @ G - hat(matvec(G, a))  # and that of τ'
+        GM = G @ M
+        QM = (G @ W - H) @ M
         by_w = GM @ T1 + QM @ T0 - G @ V + V @ G
         return [by_w, GM @ T0 + QM @ G, np.broadcast_to(GM @ G, W.shape)]
 
@@ -194,14 +197,17 @@ class Jerk:
 
     def momenta(self, w: Array, a: Array, b: Array, d: Array) -> tuple[Array, list[Array]]:
         """Return the momenta −2 j' − w × j (of w) and 2 j (of w'), and their derivatives."""
-        j, j_rate = self.deviation(w, a, b), d + cross(w, b) / 2
-        W, one = hat(w), np.broadcast_to(np.eye(3), (*w.shape, 3))
+        j = self.deviation(w, a, b)
+        j_rate = d + cross(w, b) / 2
+        W = hat(w)
+        one = np.broadcast_to(np.eye(3), W.shape)
         by_j = [-hat(a) / 2, W / 2, one, 0 * one]
         by_rate = [-hat(b) / 2, 0 * one, W / 2, one]
         by = [-2 * y - W @ x for x, y in zip(by_j, by_rate, strict=True)]
         by[0] = by[0] + hat(j)
         both = [np.concatenate([y, 2 * x], axis=-2) for x, y in zip(by_j, by, strict=True)]
-        return np.concatenate([-2 * j_rate - cross(w, j), 2 * j], axis=-1), both
+        of_w = -2 * j_rate - cross(w, j)
+        return np.concatenate([of_w, 2 * j], axis=-1), both
 
     def p(self, w: Array, a: Array, b: Array, d: Array, e: Array) -> Array:
         """Return j'' + ½ w × j' + w' × j; d and e are the third and fourth derivatives of w."""

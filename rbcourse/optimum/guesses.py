@@ -41,16 +41,18 @@ def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp],
     first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
     speeds = np.linalg.norm([ends.w0, ends.w1, *(a / 2 for a in accelerations)], axis=-1)
     fast = speeds.sum(axis=0) > FAST
-    ahead, back = exp_so3(np.stack([first, -last]))
-    C1, F = ends.R0 @ ahead, _with_free_end(ends, n, *accelerations)
-    goals = C1.mT @ ends.R1 @ back, F[:, -1].mT @ ends.R1
+    C1 = ends.R0 @ exp_so3(first)
+    F = _with_free_end(ends, n, *accelerations)
+    goals = C1.mT @ ends.R1 @ exp_so3(-last), F[:, -1].mT @ ends.R1
     v = np.concatenate([_both_ways(goal, first + last) for goal in goals])
     t = grid(n).t[:, None]
     between = exp_so3(t * t * (3 - 2 * t) * v[:, :, None])
     over = exp_so3(t**3 * last[:, None] - (1 - t) ** 3 * first[:, None])
-    R = np.concatenate([C1[:, None] @ between[:2] @ over, F @ between[2:]]).reshape(-1, n, 3, 3)
-    some = np.append([True] * (2 * len(C1)), np.tile(fast, 2))
-    return np.tile(np.arange(len(C1)), 4)[some], R[some]
+    R = np.concatenate([C1[:, None] @ between[:2] @ over, F @ between[2:]])
+    count = len(C1)
+    problem = np.tile(np.arange(count), 4)
+    used = np.append([True] * (2 * count), np.tile(fast, 2))
+    return problem[used], R.reshape(-1, n, 3, 3)[used]
 
 
 def _with_free_end(ends: Ends, n: int, *accelerations: Array) -> Array:
@@ -104,14 +106,16 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp]
     has the given ends. At t = ½, one v is the shortest logarithm, and the other v turns the other
     way round. The first result is the problem index of each curve.
     """
-    fine, t = grid(2 * n - 1).t, grid(n).t
-    R0, w0 = np.stack([ends.R0, ends.R1]), _bounded(np.stack([ends.w0, -ends.w1]))
-    F, back = np.moveaxis(free_motions(R0, w0, G, fine), 1, 0)
+    R0 = np.stack([ends.R0, ends.R1])
+    w0 = _bounded(np.stack([ends.w0, -ends.w1]))  # B runs backward
+    F, back = np.moveaxis(free_motions(R0, w0, G, grid(2 * n - 1).t), 1, 0)
     v = _continuous_log(F.mT @ back[::-1])[:, ::2]
-    R = F[::2] @ exp_so3((t * t * (3 - 2 * t))[:, None, None] * v)
+    t = grid(n).t[:, None, None]
+    R = F[::2] @ exp_so3(t * t * (3 - 2 * t) * v)
     R = np.moveaxis(R, 1, 2).reshape(-1, n, 3, 3)
     number = np.tile(np.arange(len(ends.w0)), 2)
-    return number, with_ends(R, np.stack([ends.w0, ends.w1], axis=1)[number])
+    end_rates = np.stack([ends.w0, ends.w1], axis=1)
+    return number, with_ends(R, end_rates[number])
 
 
 def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
@@ -257,9 +261,11 @@ def gauss_newton(functional: Functional, R: Array, shapes: list[Array]) -> tuple
     entries of u, shape (N, 3 n, 1), approximates the integral of ‖u‖².
     """
     count, n = R.shape[:2]
-    rates, root = rates_of(R, len(shapes) - 1), np.sqrt(grid(n).integral[-1])[:, None]
-    D = np.stack(by_eta(functional.deviation_by(*rates), rates), axis=-2)
-    J = np.stack(shapes, axis=-1)[:, None] @ (root[..., None, None] * D)
+    rates = rates_of(R, len(shapes) - 1)
+    root = np.sqrt(grid(n).integral[-1])[:, None]
+    by = by_eta(functional.deviation_by(*rates), rates)
+    D = root[..., None, None] * np.stack(by, axis=-2)
+    J = np.stack(shapes, axis=-1)[:, None] @ D
     u = root * functional.deviation(*rates)
     return J.reshape(count, 3 * n, -1), u.reshape(count, 3 * n, 1)
 
