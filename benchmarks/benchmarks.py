@@ -147,7 +147,7 @@ def fastest_timing(n, rng):
 def one_optimum(n, rng, case):
     """Solve one problem of the paper (BK), and compute 101 rotations; textbook uses `solve_bvp`."""
     yield OURS, lambda: rb.minimum_acceleration_so3(*ENDS[case])(MOMENTS)
-    yield "rbcourse, shooting", lambda: rb.shoot_minimum_acceleration_so3(*ENDS[case])(MOMENTS)
+    yield "textbook, shooting", lambda: textbook.shoot(*ENDS[case], MOMENTS)
     yield "rbcourse, projected cubic", lambda: rb.projected_cubic_so3(*ENDS[case])(MOMENTS)
     yield "textbook", lambda: textbook.minimum_acceleration_so3(*ENDS[case], MOMENTS)[0]
 
