@@ -70,9 +70,9 @@ def excess_estimate(curve: Curve) -> Array:
     for some in blocks(len(w), _TOGETHER):
         saved[some] = _decrement(w[some], a[some])
     saved[left_out | ~(saved <= cost / 2)] = np.nan
-    saved, cost = (summed(curve, x, legs, 3) for x in (saved, cost))
+    all_saved, total = (summed(curve, x, legs, 3) for x in (saved, cost))
     with np.errstate(invalid="ignore"):  # 0/0
-        return saved / (cost - saved)
+        return all_saved / (total - all_saved)
 
 
 def _decrement(w: Array, a: Array) -> Array:
