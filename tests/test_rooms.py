@@ -29,10 +29,11 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbclassroom.atlas": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
     "rbclassroom.course": {"rbcourse", "rbclassroom"},
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
-    "rbclassroom.lecture": {"rbcourse", "rbclassroom.course", "rbcourse.draw"},
+    "rbclassroom.lecture": {"rbcourse", "rbcourse.draw"}
+    | {"rbclassroom.course", "rbclassroom.explorers"},
     "rbclassroom.live": {"rbcourse", "rbclassroom.assignments"},
     "rbclassroom.book": {"rbclassroom.course", "rbclassroom.lecture", "rbclassroom.assignments"}
-    | {"rbclassroom.live", "rbcourse.draw"},
+    | {"rbclassroom.live", "rbcourse.draw", "rbclassroom.explorers"},
 }
 PUBLIC = {name for name in rbcourse.__all__ if inspect.ismodule(getattr(rbcourse, name))}
 PUBLIC |= {"report", "textbook"}
@@ -42,7 +43,8 @@ LIBRARIES = {
     "rbcourse.draw": {"PIL", "matplotlib", "mpl_toolkits"},
     "rbcourse.report": {"matplotlib"},
     "rbclassroom": set(),
-    "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"},
+    "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"}
+    | {"pooch"},
     "rbclassroom.figures": {"matplotlib"},
     "rbclassroom.atlas": {"threadpoolctl"},
     "rbclassroom.course": {"PIL", "jupyterlab", "nbclient", "nbformat", "tornado"},
