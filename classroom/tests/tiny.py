@@ -24,7 +24,8 @@ serve(pathlib.Path(sys.argv[1]))
 
 def lesson_at(folder, *cells):
     """Write a lesson of these cells into the course of a folder; return its path."""
-    (folder / "notebooks").mkdir(parents=True)
+    (folder / "notebooks" / "slides").mkdir(parents=True)
+    (folder / "notebooks" / "slides" / "01.md").touch()
     path = folder / "notebooks" / "01_tiny.ipynb"
     path.write_text(nbformat.writes(new_notebook(cells=list(cells))), encoding="utf-8")
     return path

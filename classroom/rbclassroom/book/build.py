@@ -202,13 +202,13 @@ class Sources:
             self.put(page, relinked(text, path, page))
 
     def put_course(self) -> None:
-        """Write ``course.zip``: both packages, the lessons without outputs, and `course.py`.
+        """Write ``course.zip``: packages, lessons without outputs, their slides, and `course.py`.
 
         Readers can run the course from this zip. It does not contain the problem sets, because they
         have model answers and hidden tests. It contains the check that students run before they
         submit.
         """
-        homes = "rbcourse", "classroom/rbclassroom"
+        homes = "rbcourse", "classroom/rbclassroom", "notebooks/slides"
         inside = (path for home in homes for path in (self.root / home).rglob("*.*"))
         package = [path.relative_to(self.root).as_posix() for path in inside]
         names = [

@@ -66,9 +66,10 @@ class Deck:
 
 
 class _Reader:
-    def __init__(self, path: Path, texts: dict[str, str]) -> None:
-        self.root, self.texts = path.resolve().parents[1], texts
+    def __init__(self, path: Path, names: Collection[str]) -> None:
+        self.root = path.resolve().parents[1]
         self.sketches = path.parent / "slides" / f"{path.name[:2]}.svg"
+        self.texts = texts_of(self.sketches.with_suffix(".md"), names)
         self.section = ""
         self.shown, self.behind = list[Slide](), list[Slide]()
         self.ahead = list[str]()  # notes for the next slide
@@ -267,9 +268,7 @@ def deck_of(path: Path) -> Deck:
         cells, sheet = split_sheet(nbformat.read(path, as_version=4))
         if not cells or not cells[0].source.startswith("# "):
             raise ValueError("it does not begin with a title, such as # The plane")
-        file = path.parent / "slides" / f"{path.name[:2]}.md"
-        texts = texts_of(file, [cell.id for cell in cells]) if file.exists() else {}
-        reader = _Reader(path, texts)
+        reader = _Reader(path, {cell.id for cell in cells})
         for cell in cells:
             reader.read(cell)
         title = reader.shown[0]

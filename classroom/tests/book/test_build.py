@@ -76,6 +76,7 @@ def test_the_course_is_included_without_outputs(written, source):
     needed = {path for path in (ROOT / "rbcourse").rglob("*.*") if "__pycache__" not in path.parts}
     assert {path.relative_to(ROOT).as_posix() for path in needed if path.is_file()} <= names
     assert {"rbcourse/py.typed", "classroom/rbclassroom/book/pages/index.md"} <= names
+    assert {"notebooks/slides/06.md", "notebooks/slides/06.svg"} <= names
     assert not any(name.startswith(("notebooks/assignments", "tests", "figures")) for name in names)
     assert all(cell.get("outputs", []) == [] for cell in lesson["cells"])
     install = source("install.md")

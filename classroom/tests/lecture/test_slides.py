@@ -92,9 +92,11 @@ def test_slides_show_only_the_text_written_for_them(tmp_path):
 )
 def test_a_text_without_a_cell_is_refused(tmp_path, texts, wrong):
     path = lesson_at(tmp_path, *(new_markdown_cell("# It", id=name) for name in ("one", "two")))
-    (path.parent / "slides").mkdir()
     (path.parent / "slides" / "01.md").write_text(texts, encoding="utf-8")
     with pytest.raises(ValueError, match=re.escape(f"01_tiny.ipynb: slides/01.md, line {wrong}")):
+        deck_of(path)
+    (path.parent / "slides" / "01.md").unlink()
+    with pytest.raises(ValueError, match=r"01_tiny\.ipynb: .*No such file .*01\.md"):
         deck_of(path)
 
 
