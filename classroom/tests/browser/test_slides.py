@@ -154,7 +154,8 @@ def test_the_dark_scheme_is_never_automatic(context):
         page.keyboard.press("d")
         expect(page.locator("html")).not_to_have_class(re.compile("dark"))
         page.keyboard.press("?")
-        for words in ("Open or close a vote", "Dark or light", "After the end", "Slide overview"):
+        keys = "Open or close a vote", "Dark or light", "After the end", "Readouts", "overview"
+        for words in keys:
             expect(page.locator(".r-overlay-help")).to_contain_text(words)
         page.keyboard.press("Escape")
         until(page, ":has(.panel input)")
