@@ -23,7 +23,7 @@ from rbclassroom.assignments.handout import pack, release
 from rbclassroom.book import lessons, places, reference
 from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.lessons import write
-from rbclassroom.book.places import CONTENTS, MOVED, PAGES, relinked
+from rbclassroom.book.places import CONTENTS, PAGES, relinked
 from rbclassroom.book.serve import serve
 from rbclassroom.course import ledger, options
 from rbclassroom.course.folder import require_writable
@@ -167,21 +167,13 @@ class Sources:
         for module in (each for some in modules.values() for each in some):
             page = self.rendered("module.rst.j2", module=module)
             self.put(f"package/{module['name']}.rst", page)
-        addresses = dict(MOVED)
-        for room in set(places.CLASSROOM) - {*CONTENTS["rooms"], "figures"}:  # no pages
-            for file in (self.root / "classroom" / "rbclassroom" / room).glob("[a-z]*.py"):
-                address = f"../code/classroom/rbclassroom/{room}/{file.stem}"
-                addresses[f"package/{room}.{file.stem}"] = address
-        for old, new in addresses.items():
-            moved = self.rendered("moved.html.j2", page=f"{new}.html")
-            write(self.extra / f"{old}.html", moved)
-        for path in reference.shown_code(self.root):
+        found = ledger.collect(self.root)
+        for path in reference.shown_code(self.root, found):
             code, up = reference.coloured(self.read(path)), "../" * (path.count("/") + 1)
             page = self.rendered("code.html.j2", path=path, up=up, code=code)
             write(self.extra / "code" / path.replace(".py", ".html"), page)
         shutil.copytree(self.root / "figures", self.extra / "figures")
         files = {path.name for path in (self.root / "figures").iterdir()}
-        found = ledger.collect(self.root)
         self.shown |= {"modules": modules, "found": found, "files": files}
 
     def put_files(self) -> None:
@@ -292,27 +284,22 @@ def replace(book: Path, pages: Path, old: Path) -> list[str]:
     """Put new pages in place of a book; copy the files that `build` did not make, and return them.
 
     The folder of the book is moved to `old`, and moved back if the new one cannot be put in its
-    place. In a book of an earlier version, which has no list of its files, all files that are not
-    among the new pages are kept.
+    place.
     """
-    record = book / MADE
-    lines = record.read_text("utf-8").splitlines() if record.exists() else []
-    has_list, made = lines[:1] == [HEAD], {Path(MADE), *map(Path, lines[1:])}
-    made |= {folder for path in made for folder in path.parents}
+    made = set((book / MADE).read_text("utf-8").splitlines()[1:]) if book.exists() else set()
+    made.add(MADE)
     kept = []
     for path in sorted(book.rglob("*")):
-        inner, link = path.relative_to(book), path.is_symlink()
-        target = pages / inner
-        if inner in made or (target.exists() and not has_list):
+        name, target = path.relative_to(book).as_posix(), pages / path.relative_to(book)
+        if name in made:
             continue
-        if path.is_dir() and not link:
+        if path.is_dir() and not path.is_symlink():
             target.mkdir(parents=True, exist_ok=True)
         elif os.path.lexists(target):
             raise ValueError(f"{path} would be replaced by a page of the book; move it away")
-        elif path.is_file() or link:
-            target.parent.mkdir(parents=True, exist_ok=True)
+        else:
             shutil.copy2(path, target, follow_symlinks=False)
-            kept.append(inner.as_posix())
+            kept.append(name)
     try:
         if book.exists():
             book.rename(old)

@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from rbclassroom.book import reference
-from rbclassroom.book.places import anchor, file_of, fragment, to_tests
+from rbclassroom.book.places import anchor, file_of, fragment
 from rbclassroom.course.ledger import KEY
 from rbclassroom.lecture.deck import mathjax
 
@@ -52,14 +51,11 @@ def skip_foreign(_app: Any, _what: str, _name: str, obj: Any, _skip: bool, _: An
     return None if module.startswith(("rbcourse", "rbclassroom")) else True
 
 
-def join_ledger(app: Any, what: str, name: str, _: Any, __: Any, lines: list[str]) -> None:
-    """Link the keys in a docstring to the ledger, and add the tests of a function."""
+def join_ledger(_app: Any, _: str, __: str, ___: Any, ____: Any, lines: list[str]) -> None:
+    """Link the keys in a docstring to the ledger."""
     for i, line in enumerate(lines):
         if not line.lstrip().startswith((">>>", "...")):
             lines[i] = KEY.sub(lambda key: f"`{key[0]} <../ledger.html#{anchor(key[0])}>`__", line)
-    named = app.config.tests if what in ("function", "class") else {}
-    if named and (tests := reference.tests_of(name.partition(".")[2], named)):
-        lines += ["", ".. raw:: html", "", f"   {to_tests(tests, 'package/index.html')}", ""]
 
 
 def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
@@ -114,7 +110,6 @@ def setup(app: Any) -> None:
     `name_sections` is called before Sphinx collects the contents of a page.
     """
     app.config.html_static_path.append(str(mathjax()))
-    app.add_config_value("tests", reference.naming(Path()), "")
     app.config.html_extra_path.append(os.environ["RBCOURSE_BOOK_EXTRA"])
     app.connect("autodoc-skip-member", skip_foreign)
     app.connect("doctree-read", name_sections, priority=400)

@@ -9,7 +9,6 @@ from rbclassroom.course.ledger import KEY, MISPRINTS, WHAT
 
 CONTENTS = tomllib.loads(Path(__file__).with_name("contents.toml").read_text("utf-8"))
 PAGES: dict[str, str] = CONTENTS["pages"]
-MOVED: dict[str, str] = CONTENTS["moved"]
 CLASSROOM = "explorers", "figures", "atlas", "course", "lecture", "assignments", "live", "book"
 """The parts of `rbclassroom`; all other modules are in `rbcourse`."""
 
@@ -44,6 +43,18 @@ def file_of(module: str) -> str:
     return f"{'classroom/' * path.startswith('rbclassroom')}{path}.py"
 
 
+def file_of_test(test: str) -> str:
+    """Return the file of a test, given its name in the ledger.
+
+    Examples
+    --------
+    >>> file_of_test("test_so3.py::test_exp"), file_of_test("atlas/test_atlas.py::test_map")
+    ('tests/test_so3.py', 'classroom/tests/atlas/test_atlas.py')
+    """
+    path = test.partition("::")[0]
+    return f"{'classroom/' * (path.split('/')[0] in CLASSROOM)}tests/{path}"
+
+
 def has_page(module: str) -> bool:
     """Tell whether a module has a page; private modules and modules for maintainers have none."""
     return not re.search(r"\b_|^(?:figures|course|lecture|assignments|book)\b", module)
@@ -75,38 +86,38 @@ def fragment(heading: str) -> str:
     return re.sub(r"\W+", "-", (numbered[0] if numbered else heading).lower()).strip("-")
 
 
-def link(to: str, page: str, text: str) -> str:
+def link(to: str, text: str, page: str = "ledger.md") -> str:
     """Return a link from a page to an address in the book, as HTML."""
     return f'<a href="{relpath(to, dirname(page) or ".")}">{text}</a>'
 
 
-def to_tests(tests: list[str], page: str = "ledger.md") -> str:
+def to_tests(tests: list[str]) -> str:
     """Return links to tests, given their names in the ledger; two or more links are folded."""
     links = []
-    for path, name in (test.split(".py::") for test in tests):
-        home = "classroom/tests" if path.split("/")[0] in CLASSROOM else "tests"
-        to = f"code/{home}/{path}.html#{name}"
-        links.append(link(to, page, name.replace("_", "_<wbr>")))
+    for test in tests:
+        name = test.partition("::")[2]
+        to = f"code/{file_of_test(test).removesuffix('.py')}.html#{name}"
+        links.append(link(to, name.replace("_", "_<wbr>")))
     shown = "<br>".join(links)
     more = f"<details><summary>{len(tests)} tests</summary>{shown}</details>"
     return more if len(tests) > 1 else shown
 
 
-def to_function(name: str, page: str = "ledger.md") -> str:
+def to_function(name: str) -> str:
     """Return a link to the docstring of a function, or to its code if the function is private."""
     module, _, own = name.rpartition(".")
     to = f"package/{module}.html#{full_name(name)}"
     if not has_page(module):
         to = f"code/{file_of(module).removesuffix('.py')}.html#{own}"
     text = name.replace(".", ".<wbr>").replace("_", "_<wbr>")
-    return link(to, page, f"<code>{text}</code>")
+    return link(to, f"<code>{text}</code>")
 
 
-def to_section(place: str, page: str = "ledger.md") -> str:
+def to_section(place: str) -> str:
     """Return a link to a section of a lesson, given its name in the ledger."""
     file, section = place.split(".ipynb, ", 1)
     text = f"{file[:2]} {'§ ' * section.isdigit()}{section}"
-    return link(f"lessons/{lesson_of(place)}", page, text)
+    return link(f"lessons/{lesson_of(place)}", text)
 
 
 def lesson_of(place: str) -> str:
@@ -126,7 +137,7 @@ def with_keys(text: str, page: str = "ledger.md") -> str:
 
     def put(key: re.Match[str]) -> str:
         known = key[0] in WHAT or key[0] in MISPRINTS
-        return link(f"ledger.html#{anchor(key[0])}", page, key[0]) if known else key[0]
+        return link(f"ledger.html#{anchor(key[0])}", key[0], page) if known else key[0]
 
     return KEY.sub(put, text)
 

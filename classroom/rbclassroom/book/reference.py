@@ -2,7 +2,6 @@
 
 import ast
 import re
-from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -14,7 +13,7 @@ from pygments.lexers import PythonLexer
 from pygments.token import Comment, Keyword, String, Token
 
 from rbclassroom.book.lessons import Figure
-from rbclassroom.book.places import CONTENTS, file_of, full_name, has_page
+from rbclassroom.book.places import CONTENTS, file_of, file_of_test, full_name, has_page
 from rbclassroom.course.ledger import Entry
 
 
@@ -58,14 +57,15 @@ def _definitions(tree: ast.Module) -> Iterator[tuple[str, str, ast.stmt]]:
                 yield name, "data", node
 
 
-def shown_code(root: Path) -> list[str]:
-    """Return the files whose code has a page; tests that contain answers have no page."""
-    packages, tests = ("rbcourse", "classroom/rbclassroom"), ("tests", "classroom/tests")
-    paths = [path for package in packages for path in (root / package).rglob("*.py")]
-    paths += [path for folder in tests for path in (root / folder).rglob("test_*.py")]
-    names = sorted(path.relative_to(root).as_posix() for path in paths)
-    hidden = re.compile("classroom/tests/(assignments|book|browser|hostile)/")
-    return [name for name in names if not hidden.match(name)]
+def shown_code(root: Path, found: dict[str, Entry]) -> list[str]:
+    """Return the files whose code has a page, because the package's pages or the ledger link to it.
+
+    `found` has the entries of the ledger.
+    """
+    names = {each["name"] for some in modules(root).values() for each in some}
+    names |= {name.rpartition(".")[0] for entry in found.values() for name in entry.functions}
+    tests = {file_of_test(test) for entry in found.values() for test in entry.tests}
+    return sorted(tests.union(map(file_of, names)))
 
 
 def coloured(source: str) -> str:
@@ -78,50 +78,6 @@ def coloured(source: str) -> str:
     for name, _, node in _definitions(ast.parse(source)):
         lines[node.lineno - 1] = f'<a id="{name}"></a>{lines[node.lineno - 1]}'
     return "\n".join(lines)
-
-
-def naming(root: Path) -> dict[str, list[str]]:
-    """Return a dict that maps the names of functions to the tests that use them.
-
-    Functions have names such as ``so3.exp_so3``. Tests are named as in the ledger:
-    ``test_so3.py::test_exp``.
-    """
-    found, exported = defaultdict(list), {}
-    for init in (root / "rbcourse").rglob("__init__.py"):
-        room = ".".join(init.relative_to(root).parts[:-1])
-        for name, target in _imported(ast.parse(init.read_text(encoding="utf-8"))).items():
-            exported[f"{room}.{name}"] = target
-    for file in shown_code(root):
-        path = file.rpartition("tests/")[2]
-        tree = ast.parse((root / file).read_text(encoding="utf-8"))
-        known = _imported(tree)
-        for test in tree.body:
-            if isinstance(test, ast.FunctionDef) and test.name.startswith("test_"):
-                nodes = (x for x in ast.walk(test) if isinstance(x, ast.Name | ast.Attribute))
-                read = (ast.unparse(node).partition(".") for node in nodes)
-                full = {known[top] + dot + rest for top, dot, rest in read if top in known}
-                for name in {exported.get(each, each) for each in full}:
-                    name = name.removeprefix("rbcourse.").removeprefix("rbclassroom.")
-                    found[name].append(f"{path}::{test.name}")
-    return found
-
-
-def _imported(tree: ast.Module) -> dict[str, str]:
-    known = {}
-    for node in tree.body:
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            module = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
-            for alias in node.names:
-                known[alias.asname or alias.name] = f"{module}{alias.name}"
-    return known
-
-
-def tests_of(name: str, named: dict[str, list[str]]) -> list[str]:
-    """Return a function's tests in its module's test file or, if none are there, all its tests."""
-    *room, module, _ = name.split(".")
-    own = "/".join([*room, f"test_{module}"])
-    found = named.get(name, [])
-    return [test for test in found if test.startswith(own)] or found
 
 
 def pictures_of(key: str, entry: Entry, figures: Iterable[Figure]) -> list[Figure]:
