@@ -86,12 +86,3 @@ def timed(context):
     with watched(own) as page:
         yield page
     own.close()
-
-
-def pytest_terminal_summary(terminalreporter):
-    reports = terminalreporter.stats.get("passed", []) + terminalreporter.stats.get("failed", [])
-    rows = [value for report in reports for key, value in report.user_properties if key == "speed"]
-    if rows:
-        head = f"{'explorer':26}{'median':>10}{'longest':>10}{'held':>10}{'last after':>12}"
-        terminalreporter.write_line("From key press to new picture, while the other tests run")
-        terminalreporter.write_line("\n".join([head, *rows]))

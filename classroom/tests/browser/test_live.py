@@ -8,25 +8,24 @@ import re
 import shutil
 import zipfile
 from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from http.server import ThreadingHTTPServer
 from pathlib import Path
 from textwrap import indent
 from threading import Thread
 
 import nbformat
-import pooch
 import pytest
 from pages import watched
 from playwright.sync_api import expect
 from test_problems import SETS, SOURCE, TABLES, TESTS, cells, head
 from test_sets_graded import regions
-from tiny import served
 
 from rbclassroom.assignments.check import check
 from rbclassroom.assignments.collect import collect
 from rbclassroom.assignments.grade import grade
 from rbclassroom.assignments.handout import release
 from rbclassroom.book.lessons import joined
+from rbclassroom.book.serve import Handler
 from rbclassroom.live import engine
 from rbclassroom.live.pages import LEFT_OUT
 
@@ -45,11 +44,6 @@ RUN = """async ([cell, page]) => {
     [kind, kind === "html" ? /alt="([^"]*)"/.exec(content)?.[1] ?? "" : content]);
 }"""
 OUTPUTS = ":is(.outputs pre, .outputs .hint, .outputs figure)"
-
-
-class Handler(SimpleHTTPRequestHandler):
-    def log_message(self, *_):
-        pass
 
 
 @pytest.fixture(scope="session")
@@ -313,17 +307,6 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
     assert (row["automatic"], row["by hand"], row["remarks"]) == ("17", "tip-words-answer", "")
 
 
-def test_answers_are_there_after_the_server_was_stopped(context):
-    """A browser stores answers for an address with its port."""
-    for before, now in ("", "It turns."), ("It turns.", "It turns about z."):
-        with served(BOOK) as address, watched(context) as page:
-            page.goto(f"{address}problems/ps1.html")
-            words = page.locator(".answer-in-words textarea")
-            expect(words).to_have_value(before)
-            words.fill(now)
-            page.goto("about:blank")  # leave the page before the server ends
-
-
 def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
     """Search for hidden tests, mark schemes and model answers: plain, reversed or as base64."""
     kinds = "SOLUTION|HIDDEN TESTS|MARK SCHEME"
@@ -343,9 +326,3 @@ def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
                 with zipfile.ZipFile(io.BytesIO(content)) as archive:
                     content = b"\n".join(map(archive.read, archive.namelist()))
             assert [form for form in forms if form in content] == [], path
-
-
-def test_the_files_of_pyodide_are_the_official_ones():
-    for name, digest in engine.FILES.items():
-        if name not in engine.PACKED:
-            assert pooch.file_hash(str(LIVE / name)) == digest, name

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.patches import Annulus
-from pixels import check_alike, shown
+from pages import check_alike, shown
 
 from rbclassroom import explorers
 from rbclassroom.explorers import recorded

@@ -6,9 +6,9 @@ import re
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from pixels import check_alike, pixels, shown
+from pages import check_alike, pixels, shown
 from playwright.sync_api import expect
-from test_recorded import FOLDER
+from test_recorded import show
 
 import rbcourse as rb
 from rbcourse.draw import animate, bodies, save_figure, spheres
@@ -171,7 +171,7 @@ def test_a_finger_turns_a_scene_sideways_on_a_phone(context):
     size = {"width": 390, "height": 800}
     phone = context.browser.new_context(viewport=size, has_touch=True, device_scale_factor=2)
     page = phone.new_page()
-    page.goto((FOLDER / "cube.html").as_uri())
+    show(page, "cube")
     canvas, view = page.locator("canvas"), page.locator(".rbcourse-view output")
     box, before = canvas.bounding_box(), view.inner_text()
     assert box["width"] <= 390

@@ -27,7 +27,7 @@ def notebook_at(path, *sources):
     return path
 
 
-def test_the_kernel_that_runs_a_lesson01_opens_no_port(tmp_path):
+def test_the_kernel_that_runs_a_lesson_opens_no_port(tmp_path):
     sources = [
         "print('one', flush=True)\nprint('two')",
         "import ipykernel, json\nprint(json.loads(ipykernel.get_connection_info())['transport'])",
@@ -42,7 +42,7 @@ def test_the_kernel_that_runs_a_lesson01_opens_no_port(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kernels listen at ports on Windows")
-def test_the_kernel_that_tests_a_lesson01_opens_no_port(monkeypatch, request):
+def test_the_kernel_that_tests_a_lesson_opens_no_port(monkeypatch, request):
     monkeypatch.setattr(nbval.kernel, "KernelManager", KernelManager)
     conftest = Path(__file__).parents[3] / "notebooks/conftest.py"
     runpy.run_path(str(conftest))["pytest_configure"](request.config)
@@ -77,7 +77,7 @@ def test_nothing_is_removed_from_a_folder_without_lessons(tmp_path):
     assert (tmp_path / "thesis.pdf").exists()
 
 
-def test_nothing_is_rewritten_if_a_lesson01_fails(tmp_path):
+def test_nothing_is_rewritten_if_a_lesson_fails(tmp_path):
     good = "import os, pathlib\npathlib.Path(os.environ['RBCOURSE_FIGURES'], 'new.png').touch()"
     paths = [
         notebook_at(tmp_path / "01_good.ipynb", good),
@@ -92,7 +92,7 @@ def test_nothing_is_rewritten_if_a_lesson01_fails(tmp_path):
     assert [file.name for file in figures.iterdir()] == ["old.png"]
 
 
-def test_storing_one_lesson01_changes_no_other_file(tmp_path, monkeypatch):
+def test_storing_one_lesson_changes_no_other_file(tmp_path, monkeypatch):
     async def execute(path, figures):
         """Save a figure named after the lesson; return the lesson with a new source."""
         name = path.stem[3:]
@@ -212,7 +212,7 @@ def test_a_copy_that_was_edited_is_never_changed(folders, capsys, there, work):
     assert "your copy is kept, the new one is 01_plane_2.ipynb" in capsys.readouterr().out
 
 
-def test_a_lesson01_that_is_not_a_notebook_is_reported(folders, monkeypatch):
+def test_a_lesson_that_is_not_a_notebook_is_reported(folders, monkeypatch):
     closed, close = [], SQLiteSignatureStore.close
     monkeypatch.setattr(SQLiteSignatureStore, "close", lambda s: closed.append(close(s)))
     (folders[0] / "02_arm.ipynb").write_text("<<<<<<< HEAD")

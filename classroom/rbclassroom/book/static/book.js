@@ -1,4 +1,4 @@
-// Scripts of the book's pages, for polls, folded code, wide formulas, panels and excerpts.
+// Scripts of the book's pages, for polls, folded code, wide formulas, panels, excerpts and the ledger.
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
 
@@ -123,4 +123,28 @@ addEventListener("DOMContentLoaded", () => {
   };
   document.head.append(Object.assign(document.createElement("script"), { src: "_static/texts.js", onload: tell }));
   new MutationObserver(tell).observe(results, { childList: true, subtree: true });
+});
+
+// The filter of the ledger shows the rows whose name equals the filter. If there are none, it shows the
+// rows with a cell that contains the filter. If there are none either, it shows the rows that contain all
+// words of the filter.
+addEventListener("DOMContentLoaded", () => {
+  const filter = document.getElementById("filter"), found = document.getElementById("found");
+  if (!filter) return;
+  const plain = (text) => text.toLowerCase().replace(/\bfigures?\b/g, "fig.").replace(/\s+/g, " ").trim();
+  const sections = [...document.querySelectorAll("section:has(> * table.ledger, > table.ledger)")];
+  const rows = [...document.querySelectorAll("table.ledger tbody tr")].map((row) => (
+    { row, cells: [...row.cells].map((cell) => plain(cell.innerText || cell.textContent)), text: plain(row.textContent) }));
+  const show = () => {
+    const phrase = plain(filter.value), words = phrase.split(" ");
+    let chosen = rows.filter(({ cells }) => cells[0] === phrase);
+    if (!chosen.length) chosen = rows.filter(({ cells }) => cells.some((cell) => cell.includes(phrase)));
+    if (!chosen.length) chosen = rows.filter(({ text }) => words.every((word) => text.includes(word)));
+    for (const each of rows) each.row.hidden = !chosen.includes(each);
+    for (const section of sections) section.hidden = !section.querySelector("tbody tr:not([hidden])");
+    found.textContent = phrase ? `${chosen.length} of ${rows.length} rows` : "";
+  };
+  filter.addEventListener("input", show);
+  addEventListener("hashchange", () => { filter.value = ""; show(); });
+  show();
 });
