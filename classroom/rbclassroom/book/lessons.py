@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-import numpy as np
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 from PIL import Image
@@ -111,8 +110,7 @@ def with_picture_files(
     """Return HTML with pictures in files; by default a picture is loaded when it becomes visible.
 
     `known` maps the contents of pictures to their addresses. Other pictures are written to the
-    folder ``pictures`` inside `folder`. The attribute ``data-cuts`` of a wide picture lists the
-    places between its panels at which the picture can be cut.
+    folder ``pictures`` inside `folder`. Pictures with ``data-wide`` scroll on phones.
     """
 
     def put(match: re.Match[str]) -> str:
@@ -122,31 +120,12 @@ def with_picture_files(
             (folder / "pictures").mkdir(parents=True, exist_ok=True)
             (folder / known[content]).write_bytes(content)
         with Image.open(io.BytesIO(content)) as still:
-            (width, height), cuts = still.size, cuts_of(still)
+            width, height = still.size
         before = match[1].replace('style="', f'style="aspect-ratio: {width}/{height}; ', 1)
-        if cuts:
-            before += f' data-cuts="{" ".join(map(str, cuts))}"'
+        before += " data-wide" * (width >= 1.8 * height)
         return f'{before} loading="{loading}" src="{known[content]}"'
 
     return _PICTURE.sub(put, shown)
-
-
-def cuts_of(still: Image.Image) -> list[float]:
-    """Return the places at which a wide still can be cut between panels, as fractions of its width.
-
-    Each cut is in the middle of blank columns, near a boundary between equal parts of the still.
-    The width of these parts is at most 1.5 times their height.
-    """
-    width, height = still.size
-    if width < 1.8 * height:
-        return []
-    parts = round(width / height / 1.3)
-    blank = (np.asarray(still.convert("L")) > 245).all(axis=0)
-    gaps = np.flatnonzero(np.diff(blank, prepend=False, append=False)).reshape(-1, 2)
-    middles = gaps[np.diff(gaps)[:, 0] > 0.008 * width].mean(axis=1) / width
-    inner = middles[(middles > 0.2) & (middles < 0.8)]
-    near = [inner[np.abs(inner - k / parts).argmin()] for k in range(1, parts) if inner.size]
-    return sorted({round(float(cut), 4) for cut in near})
 
 
 def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:

@@ -35,7 +35,7 @@ def test_an_answer_is_folded_until_the_next_heading():
 
 def test_pictures_become_files(tmp_path):
     contents, shown = [], []
-    for size in ((3, 2), (4, 5)):
+    for size in ((4, 2), (4, 5)):
         content = io.BytesIO()
         Image.new("RGB", size).save(content, "png")
         contents.append(content.getvalue())
@@ -45,7 +45,8 @@ def test_pictures_become_files(tmp_path):
     found = lessons.with_picture_files("".join([*shown, shown[1]]), known, tmp_path)
     (written,) = (tmp_path / "pictures").iterdir()
     assert written.read_bytes() == contents[1]
-    assert 'style="aspect-ratio: 3/2; max-width: 100%"' in found
+    assert 'style="aspect-ratio: 4/2; max-width: 100%" data-wide' in found
+    assert 'style="aspect-ratio: 4/5; max-width: 100%" loading' in found
     assert 'loading="lazy" src="../figures/one.png"' in found
     assert found.count(f'src="pictures/{written.name}"') == 2
     assert "base64" not in found
@@ -109,21 +110,6 @@ def test_a_lesson_page_offers_a_download(repository):
     address = "https://mybinder.org/v2/gh/us/course/HEAD?labpath=notebooks%2F01_plane.ipynb"
     assert (address in first) == ("mybinder" in first) == bool(repository)
     assert lessons.without_outputs(notebook).cells[1].outputs == []
-
-
-def test_wide_pictures_are_split_only_between_their_panels():
-    def still(*panels, size=(900, 400)):
-        shown = Image.new("RGB", size, "white")
-        for left, right in panels:
-            shown.paste("grey", (left, 20, right, 380))
-        return shown
-
-    assert lessons.cuts_of(still((10, 430), (470, 890))) == [0.5]
-    first, second = lessons.cuts_of(still((10, 290), (310, 590), (610, 890), size=(900, 230)))
-    assert 290 / 900 < first < 310 / 900
-    assert 590 / 900 < second < 610 / 900
-    assert lessons.cuts_of(still((10, 890))) == []
-    assert lessons.cuts_of(still((10, 430), (470, 690), size=(700, 400))) == []
 
 
 def test_code_is_folded_except_in_answers_to_exercises():

@@ -1,4 +1,4 @@
-// Scripts of the book's pages, for polls, folded code, wide formulas, panels, excerpts and the ledger.
+// Scripts of the book's pages, for polls, folded code, wide formulas, excerpts and the ledger.
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
 
@@ -60,21 +60,6 @@ addEventListener("DOMContentLoaded", () => {
   // Scroll the list of pages to the current page.
   const current = all(".sidebar-tree .current-page").at(-1), list = document.querySelector(".sidebar-scroll");
   if (current) list.scrollTop = current.offsetTop - list.clientHeight / 2;
-
-  // Arrange the panels of a wide still in a column, at the same scale. CSS shows the column on phones.
-  for (const still of all("figure:not(:has(script)) img[data-cuts]")) {
-    const ends = [0, ...still.dataset.cuts.split(" ").map(Number), 1], panels = document.createElement("span");
-    const shares = ends.slice(1).map((end, k) => end - ends[k]), [wide, high] = still.style.aspectRatio.split("/").map(Number);
-    panels.className = "panels";
-    shares.forEach((share, k) => {
-      const panel = document.createElement("span"), part = Object.assign(new Image(), { src: still.src, alt: k ? "" : still.alt, loading: "lazy" });
-      panel.style = `aspect-ratio: ${share * wide} / ${high}; width: ${(100 * share) / Math.max(...shares)}%`;
-      part.style = `width: ${100 / share}% !important; left: ${(-100 * ends[k]) / share}%`;
-      panel.append(part);
-      panels.append(panel);
-    });
-    still.after(panels);
-  }
 
   // The hint "drag to turn" disappears when the reader touches the picture.
   addEventListener("pointerdown", ({ target }) => target.closest("figure")?.classList.add("touched"));
