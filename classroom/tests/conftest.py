@@ -53,6 +53,7 @@ def few_states(request):
             from rbclassroom.explorers import recorded
 
             patch.setattr(recorded, "living", recorded_briefly)
+            patch.setattr(recorded, "record_all", lambda: None)
         yield
 
 
