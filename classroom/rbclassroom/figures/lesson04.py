@@ -63,16 +63,6 @@ def draw_drift(ax: Axes, data: Table) -> None:
     name_lines(ax, dict(zip(names, places, strict=True)))
 
 
-def describe_drift(data: Table) -> str:
-    """Return a description of the picture of `draw_drift`."""
-    (_, steps), *ways = named(" [1]", data).items()
-    return (
-        "Defect ‖RᵀR − I‖ of products of many rotation matrices over their number, on logarithmic "
-        f"axes. After {steps[-1]:.0f} products it is, "
-        f"{'; '.join(f'{name}: {defect[-1]:.0e}' for name, defect in ways)}."
-    )
-
-
 def column_table(matrices: Mapping[str, Array]) -> Table:
     """Return a table of the columns of 2 × 2 matrices; each row has one column of each matrix."""
     return columns("{} {} [1]", {name: M.T for name, M in matrices.items()})
@@ -191,18 +181,3 @@ def draw_frames(ax: Axes, data: Table) -> None:
     ax.set(xlabel="the body frame is turned by (°)", ylabel="rotation found (°)")
     ax.set(xlim=(frame[0], frame[-1]), xticks=np.arange(frame[0], frame[-1] + 1, 90))
     name_lines(ax, {"nearest rotation": (155, 15), "Gram–Schmidt": (236, 28)})
-
-
-def describe_frames(data: Table) -> str:
-    """Return a description of the picture of `draw_frames`."""
-    _, *found = named(" [rad]", data).items()
-    ranges = [
-        f"{name} finds {angle.min():.1f} to {angle.max():.1f} degrees"
-        if np.ptp(angle) > 1e-6
-        else f"{name} finds {angle[0]:.1f} degrees in every frame"
-        for name, angle in ((name, np.degrees(angle)) for name, angle in found)
-    ]
-    return (
-        "The angle of the rotation that two repairs find, over the angle by which the body frame "
-        f"is turned. Of the two, {'; '.join(ranges)}."
-    )

@@ -109,14 +109,3 @@ def draw_excess(ax: Axes, data: Table) -> None:
     ax.minorticks_off()
     ax.axhline(0.01, lw=1, ls=":", **grey)
     ax.text(scale.min(), 0.013, "1 %", **grey)
-
-
-def describe_excess(data: Table) -> str:
-    """Return a description of the picture of `draw_excess`."""
-    scale, families = np.asarray(data["scale [1]"]), named(" excess [1]", data)
-    ends = "; ".join(f"{name} from {x[0]:.1e} to {x[-1]:.2g}" for name, x in families.items())
-    return (
-        "Excess of the projection over the size of the excursion, on logarithmic axes. From size "
-        f"{scale.min():g} to {scale.max():g} it grows: {ends}. "
-        "Where it is small, all curves follow a line of slope four."
-    )

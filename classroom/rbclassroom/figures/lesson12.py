@@ -88,7 +88,7 @@ def heat_map(ax: Axes, title: str, excess: Array) -> Any:
 
 
 def label_maps(fig: Figure, bar: Any, ways: str = "") -> None:
-    """Write what the axes of heat maps and their scale of colours show."""
+    """Write the labels of the axes of heat maps, and of their scale of colours."""
     fig.supylabel(f"end velocity{ways} (rad)", fontsize="medium")
     fig.supxlabel("displacement (°)", fontsize="medium")
     levels = sorted({*_LEVELS[::2], _TENTH})
@@ -142,20 +142,6 @@ def draw_growth(ax: Axes, data: Table, slopes: Mapping[int, float]) -> None:
     lowest = min(np.nanmin(median) for median in medians.values())
     _set_percents(ax, [x for x in [1e-12, 1e-10, 1e-8, 1e-6, *_LEVELS[::2]] if x > lowest / 30])
     name_ends(ax, 0.085)
-
-
-def describe_growth(data: Table) -> str:
-    """Return a description of the figure of `draw_growth`."""
-    size = np.asarray(data["size [rad]"])
-    said = "; ".join(
-        f"{way} from {f'{x[0]:.1e}' if x[0] > 1e-11 else 'less than 1e-11'} to {x[-1]:.1e}"
-        for way, x in _medians(data).items()
-    )
-    return (
-        "Cost of closed forms over the optimum minus 1, over the size of the excursion: medians. "
-        f"Both axes are logarithmic. While the size grows from {size[0]:g} to {size[-1]:g} rad, "
-        f"the median of the cost over the optimum minus 1 grows: {said}."
-    )
 
 
 def _medians(data: Table) -> dict[str, Array]:
@@ -237,16 +223,3 @@ def draw_deviations(axes: Sequence[Axes], data: Table) -> None:
     places = {"projection": (0.5, 0.006), "quaternion": (0.5, 0.0023), "Bézier": (0.5, -0.0009)}
     name_lines(axes[0], places)
     name_lines(axes[1], {"exponential": (0.5, -0.0061)})
-
-
-def describe_deviations(data: Table) -> str:
-    """Return a description of the figure of `draw_deviations`."""
-    largest = "; ".join(
-        f"{name[:-4]} {np.abs(data[name]).max():.1e}" for name in data if name != "t [1]"
-    )
-    return (
-        "Deviation of closed forms from the optimum over time, near a geodesic, for a difference d "
-        "(left) and a mean e (right) of the end velocities. Both are across the axis, and the "
-        "deviation is divided by the square of the displacement and by d or e. "
-        f"Largest: {largest}."
-    )

@@ -83,12 +83,6 @@ def draw_speeds(ax: Axes, data: Table) -> None:
     name_lines(ax, {"projected quintic": (0.58, 13.5), "least jerk": (0.66, 5.5)}, ha="left")
 
 
-def describe_speeds(data: Table) -> str:
-    """Return a description of the picture of `draw_speeds`."""
-    said = (f"{name} at most {np.max(data[f'{name} [rad]']):.1f}" for name in _SPEEDS)
-    return f"Angular speed over time. In rad per unit time: {', '.join(said)}."
-
-
 _FREE = "{} {} [rad]"
 _COORDINATES = "exponential coordinates", "normal coordinates"
 

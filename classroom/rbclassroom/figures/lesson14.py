@@ -69,23 +69,6 @@ def draw_profiles(axes: Sequence[Axes], data: Table, knots: ArrayLike) -> None:
     axes[0].figure.align_ylabels(axes)
 
 
-def describe_profiles(data: Table, knots: ArrayLike) -> str:
-    """Return a description of the picture of `draw_profiles`, with the largest values."""
-    t = np.asarray(data[_TIME])
-    parts, labels = [], []
-    for label, unit, values in _profiles(data):
-        labels.append(label)
-        scale, largest = np.abs(values).max(), int(np.argmax(np.round(values, 9)))
-        low = f"from {in_words(values.min(), scale)} " if values.min() < -0.01 * scale else ""
-        parts.append(f"{label} {low}up to {in_words(values[largest], scale)} {unit}")
-        parts[-1] += f" at {in_words(t[largest], t[-1])} s"
-    when = ", ".join(in_words(knot, t[-1]) for knot in np.asarray(knots))
-    return (
-        f"The {' and the '.join(labels)} over time, with a dotted line where a pose is reached. "
-        f"They go: {'; '.join(parts)}. The poses are reached at {when} s."
-    )
-
-
 def _profiles(data: Table) -> Iterator[tuple[str, str, Array]]:
     """Yield the label, the unit and the values of each column except for the time."""
     for name, values in data.items():
@@ -158,20 +141,6 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
     name_ends(axes[0])
 
 
-def describe_turns(data: Table) -> str:
-    """Return a description of the picture of `draw_turns`."""
-    said = (
-        f"{name} to {in_words(np.asarray(data[f'{name} [rad]'])[-1], 10)} rad, at most "
-        f"{in_words(np.abs(bend).max(), 1)} rad off the straight line"
-        for name, bend in named(" bend [rad]", data).items()
-    )
-    return (
-        "Cubic splines through three rotations about one axis, with different whole turns: the "
-        "angle over time (left), and its difference from a straight line (right). They go: "
-        f"{'; '.join(said)}."
-    )
-
-
 def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
     """Return a table of the median excess of curves through ten rotations.
 
@@ -220,14 +189,3 @@ def draw_excesses(ax: Axes, data: Table) -> None:
     ax.set_yticks(np.power(10.0, powers), names)
     ax.minorticks_off()
     name_ends(ax)
-
-
-def describe_excesses(data: Table) -> str:
-    """Return a description of the picture of `draw_excesses`."""
-    legs, found = np.degrees(data["leg [rad]"]), named(" [1]", data).items()
-    said = (f"{name} {100 * x[0]:.2g} % to {100 * x[-1]:.2g} %" for name, x in found)
-    return (
-        "Excess of curves through ten rotations over the cheapest one, over the turn of a leg. "
-        f"Both axes are logarithmic. From {legs[0]:.0f} to {legs[-1]:.0f} degrees: "
-        f"{'; '.join(said)}."
-    )
