@@ -11,6 +11,7 @@ from shown import numbers, numbers_of
 
 import rbcourse as rb
 from rbclassroom.figures import (
+    FORMS,
     described,
     lesson03,
     lesson04,
@@ -229,6 +230,46 @@ def test_each_problem_has_the_marker_of_its_family():
         held[way, "Figure 5"] = points[:, 4:5]
         held[way, "random"] = points[:, :4]
     check_held(axes, held | {("projection", "slope −3"): [line, line**-3]})
+
+
+def test_heat_maps_show_each_cell_at_its_place_and_a_line_at_10_percent():
+    # the logarithm of the excess increases with the displacement
+    slope = np.linspace(-3, 1, 10)
+    data = {"family": np.full(100, "along")}
+    data |= {f"{way} excess [1]": 10.0 ** np.repeat(slope, 10) for way in FORMS}
+    data["Bézier excess [1]"] = np.zeros(100)
+    fig = Figure(figsize=(9, 6))
+    lesson12.draw_atlas(fig, data, "median")
+    maps = {ax.get_title(): ax for ax in fig.axes if ax.get_title() in FORMS}
+    for way, ax in maps.items():
+        edges = np.asarray(ax.collections[0].get_coordinates())
+        assert edges[0, :, 0] == pytest.approx(np.arange(0, 181, 18))
+        assert edges[:, 0, 1] == pytest.approx(np.arange(0, 9.1, 0.9))
+        shown = ax.collections[0].get_array()
+        assert np.array_equal(shown, data[f"{way} excess [1]"].reshape(10, 10).T)
+        assert bool(ax.texts) == (way == "Bézier")  # "< 0.01 % everywhere"
+    for line in maps["projection"].collections[1:]:
+        drawn = np.concatenate(line.get_paths()[0].to_polygons(closed_only=False))
+        assert drawn[:, 0] == pytest.approx(np.interp(-1, slope, np.arange(9, 180, 18)))
+    said = lesson12.describe_atlas(data, "median")
+    assert "along the axis of the displacement" in said
+    assert "Bézier 100, 100, 100; corrected 30, 50, 70;" in said
+
+
+def test_rows_of_maps_are_bodies_and_columns_are_curves():
+    names = {"one": "curve\none", "two": "another"}
+    excess = np.random.default_rng(2).random((2, 2, 100))
+    data = {"body": np.repeat(["ball", "book"], 100)}
+    data |= {f"{x} median [1]": excess[:, k].ravel() for k, x in enumerate(names)}
+    fig = Figure(figsize=(9, 6))
+    lesson13.draw_body_atlas(fig, data, names)
+    *maps, _ = fig.axes
+    assert [ax.get_title() for ax in maps[:2]] == ["curve\none", "another"]
+    assert [ax.get_ylabel() for ax in maps[::2]] == ["ball", "book"]
+    for ax, wanted in zip(maps, excess.reshape(4, 10, 10), strict=True):
+        assert np.array_equal(ax.collections[0].get_array(), wanted.T)
+    share = 100 * np.mean(excess[1, 0] < 0.1)
+    assert f"book: curve one {share:.0f}," in lesson13.describe_body_atlas(data, names)
 
 
 def test_profiles_show_the_times_of_poses():
