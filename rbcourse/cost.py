@@ -16,7 +16,7 @@ from rbcourse.optimum.chebyshev import grid
 from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.paths import smooth_parts
 
-_TOGETHER = 2000  # number of panels evaluated together
+_TOGETHER = 2000  # panels evaluated together, which bounds the memory
 _HALVINGS = 30
 _MOST = 50_000  # number of panels that may be halved in one pass
 Index: TypeAlias = NDArray[np.intp]

@@ -13,7 +13,7 @@ from rbcourse.paths import smooth_parts
 from rbcourse.so3 import hat
 
 _NODES, _BUMPS = 33, 12
-_TOGETHER = 1000  # curves whose linear systems are solved together, in about 100 MB
+_TOGETHER = 1000  # curves computed together, which bounds the memory: 30 MB an array
 _SMOOTH = 1e-6  # bound on the last two Chebyshev coefficients of w', divided by √∫ ‖w'‖² dt
 SPEED_LIMIT = 2.5
 """In rad per duration: no estimate is given for a curve that turns at this speed or faster."""
@@ -66,7 +66,7 @@ def excess_estimate(curve: Curve) -> Array:
     w[left_out], a[left_out] = 0, 0
     cost = np.sum(a**2, axis=-1) @ integral[-1]
     left_out |= tails(a) > _SMOOTH * np.sqrt(cost)
-    saved = np.zeros(len(w))
+    saved: Array = np.zeros(len(w))
     for some in blocks(len(w), _TOGETHER):
         saved[some] = _decrement(w[some], a[some])
     saved[left_out | ~(saved <= cost / 2)] = np.nan

@@ -53,7 +53,7 @@ from rbcourse.paths import Chain, evaluate_legs
 
 REFINEMENTS = 3  # how often the cells of a leg are halved if it exceeds a limit
 TOLERANCE = 1e-4  # the share by which a limit may be exceeded
-_BLOCK = 1024  # cells, or times, that are evaluated together
+_BLOCK = 1024  # cells, or times, evaluated together, which bounds the memory
 _MEMORY = 200  # bytes for each cell: places, two passes, and the result
 _DENSE = 0.2  # a leg has fewer cells if its velocity changes by less than this share
 _PLACES = np.array([0, 0.5, 1])

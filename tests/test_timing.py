@@ -369,16 +369,6 @@ def test_the_first_time_at_a_limit_is_returned():
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 
 
-@pytest.mark.parametrize("name", ["norms", "boxes", "accelerations"])
-def test_no_uniform_timing_within_the_limits_is_faster(name):
-    for seed in range(4):
-        c, limits = random_chain(20 + seed), SETS[name]
-        shares = rb.limits_used(c, **limits)
-        powers = [x if k.endswith("speed") else x**0.5 for k, (x, _) in shares.items()]
-        even = max(powers) * (c.domain[1] - c.domain[0])
-        assert rb.fastest(c, **limits).domain[1] < even * (1 + 1e-3)
-
-
 def test_limits_hold_in_the_cells_next_to_a_rest():
     """In the cells next to a rest, speeds and accelerations are polynomials."""
     line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])

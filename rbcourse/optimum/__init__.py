@@ -1,4 +1,8 @@
-"""Curves on SO(3) with the least acceleration (BK (19)), the least torque or the least jerk."""
+"""Curves on SO(3) with the least acceleration (BK (19)), the least torque or the least jerk.
+
+`rbcourse.textbook.minimum_acceleration_so3` has (19) as it is printed, and `optimum.collocation`
+solves it fast, as R w'' = c.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,15 @@
-"""The explorers of the lessons: pictures that readers change with sliders."""
+"""The explorers of the lessons: pictures that readers change with sliders.
+
+| lesson | explorer | | lesson | explorer |
+|---|---|---|---|---|
+| 01 | `planar` | | 08 | `flip` |
+| 02 | `arm` | | 09, 11, 12 | `minimum_acceleration` |
+| 00, 03 | `rotation` | | 10 | `cube` |
+| 04 | `projection` | | 13 | `body` |
+| 05 | `random` | | 14 | `spline` |
+| 06 | `theta` | | 15 | `timing` |
+| 07 | `screw` | | 16 | `chain` |
+"""
 
 from rbclassroom.explorers.bodies import body_explorer
 from rbclassroom.explorers.curves import flip_explorer, screw_explorer, theta_explorer

@@ -1,11 +1,8 @@
 """Show the slides of a lesson, with votes by phone if requested, or write them as PDF."""
 
 import asyncio
-import os
 import secrets
-import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import threading
@@ -23,13 +20,11 @@ from rbclassroom.course import options
 from rbclassroom.course.folder import port_of
 from rbclassroom.course.notebooks import lesson_paths
 from rbclassroom.lecture.deck import mathjax, write
+from rbclassroom.lecture.pdf import print_pdf
 from rbclassroom.lecture.slides import deck_of
 from rbclassroom.lecture.votes import Ballot, open_votes
-from rbcourse.files import replace_file
 
 HOST = "127.0.0.1"
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
-"""Programs that print a page as PDF."""
 
 
 def find_lesson(number: str, folder: Path) -> Path:
@@ -132,28 +127,6 @@ async def serve(path: Path, votes: str | None, browser: bool, pdf: bool) -> None
         if browser:  # with some browsers, this call returns only when they are closed
             threading.Thread(target=webbrowser.open, args=[shown], daemon=True).start()
         await asyncio.Event().wait()
-
-
-def print_pdf(address: str, pdf: Path) -> None:
-    """Print slides as PDF with a browser that is based on Chromium."""
-    named = os.environ.get("BROWSER", "")
-    found = next(filter(None, map(shutil.which, (named, *BROWSERS))), None)
-    if not found:
-        names = ", ".join(BROWSERS)
-        raise ValueError(f"To print, install one of {names}, or set BROWSER to a browser's name.")
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
-        made = Path(profile, "slides.pdf")
-        words = ["--headless", "--disable-gpu", "--no-first-run", "--no-pdf-header-footer"]
-        if hasattr(os, "geteuid") and os.geteuid() == 0:
-            words.append("--no-sandbox")  # Chromium has no sandbox for the administrator
-        words += [f"--user-data-dir={profile}", f"--print-to-pdf={made}"]
-        try:
-            job = [found, *words, f"{address}?print-pdf&hold"]
-            subprocess.run(job, capture_output=True, timeout=120)
-            replace_file(pdf, made.read_bytes())
-        except (subprocess.TimeoutExpired, OSError) as error:
-            raise ValueError(f"{found} could not print the slides: {error!r}") from error
-    print(f"{pdf}: {pdf.stat().st_size / 1e6:.1f} MB")
 
 
 def main() -> None:

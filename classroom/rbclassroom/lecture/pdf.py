@@ -1,0 +1,34 @@
+"""Print slides as PDF."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from rbcourse.files import replace_file
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
+"""Programs that print a page as PDF."""
+
+
+def print_pdf(address: str, pdf: Path) -> None:
+    """Print slides as PDF with a browser that is based on Chromium."""
+    named = os.environ.get("BROWSER", "")
+    found = next(filter(None, map(shutil.which, (named, *BROWSERS))), None)
+    if not found:
+        names = ", ".join(BROWSERS)
+        raise ValueError(f"To print, install one of {names}, or set BROWSER to a browser's name.")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        made = Path(profile, "slides.pdf")
+        words = ["--headless", "--disable-gpu", "--no-first-run", "--no-pdf-header-footer"]
+        if hasattr(os, "geteuid") and os.geteuid() == 0:
+            words.append("--no-sandbox")  # Chromium has no sandbox for the administrator
+        words += [f"--user-data-dir={profile}", f"--print-to-pdf={made}"]
+        try:
+            job = [found, *words, f"{address}?print-pdf&hold"]
+            subprocess.run(job, capture_output=True, timeout=120)
+            replace_file(pdf, made.read_bytes())
+        except (subprocess.TimeoutExpired, OSError) as error:
+            raise ValueError(f"{found} could not print the slides: {error!r}") from error
+    print(f"{pdf}: {pdf.stat().st_size / 1e6:.1f} MB")
