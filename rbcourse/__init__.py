@@ -138,7 +138,7 @@ from rbcourse.so3 import (
 from rbcourse.timing import Timed, fastest, limits_used
 from rbcourse.velocities import bessel_velocities, spline_velocities
 
-__version__ = "1.6.0"
+__version__ = "2.0.0a1"
 
 __all__ = [  # noqa: RUF022 - sorted by subject
     # rotations
