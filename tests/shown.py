@@ -130,6 +130,7 @@ def check_looks(fig):
     aspect = width / height
     room = min(1744, 755 * aspect) if aspect > 1.85 else min(1210, 880 * aspect)
     assert 13.5 / 72 * room / width >= 26
+    fig.draw_without_rendering()  # the layout depends on the resolution
     flat = [ax for ax in fig.axes if ax.name == "rectilinear"]
     box = fig.get_tightbbox().transformed(fig.dpi_scale_trans)
     assert (box.min > -1).all(), box

@@ -46,33 +46,6 @@ def named(ending: str, data: Table) -> dict[str, Array]:
     }
 
 
-def described(sentence: str, data: Table) -> str:
-    """Return the description of curves: a sentence, and the range of each column after the first.
-
-    Examples
-    --------
-    >>> described("Speeds.", {"t [s]": [0, 1, 2], "low [m/s]": [1, 0, 3], "up [1]": [0, 1, 1.5]})
-    'Speeds. While t goes from 0 to 2 s: low from 1 to 3 m/s, at least 0; up from 0 to 1.5.'
-    """
-    (first, x), *columns = data.items()
-    parts = [_range(name, np.asarray(y)) for name, y in columns]
-    said = _range(first, np.asarray(x)).replace(" from", " goes from")
-    return f"{sentence} While {said}: {'; '.join(parts)}."
-
-
-def _range(name: str, column: Array) -> str:
-    """Return the first, the last, and further extreme values of a column as text."""
-    known = column[np.isfinite(column)]
-    # rounding errors differ between processors
-    known = np.where(np.abs(known) < 1e-13 * max(1, np.abs(known).max()), 0, known)
-    values = known[0], known[-1], known.min(), known.max()
-    first, last, low, high = (f"{x:.3g}" for x in values)
-    label, unit = name.removesuffix("]").rsplit(" [", 1)
-    said = f"{label} from {first} to {last}{'' if unit == '1' else f' {unit}'}"
-    said += f", at least {low}" * (low not in (first, last))
-    return said + f", at most {high}" * (high not in (first, last))
-
-
 def name_lines(ax: Axes, places: Mapping[str, tuple[float, float]], ha: str = "center") -> None:
     """Write labels of lines at the given places, each in the colour of its line."""
     colours = {str(line.get_label()): line.get_color() for line in ax.lines}

@@ -10,7 +10,7 @@ from sweeps import made, notice, points, read_off, reads, sweep, tell
 
 import rbcourse as rb
 from rbclassroom.explorers.paths import ANGLES, POSES, SHARES
-from rbcourse.draw.save import FORMS
+from rbclassroom.figures import FORMS
 
 TIMES = np.linspace(0, 1, 61)
 BOOK = np.array([0.20, 0.13, 0.03])

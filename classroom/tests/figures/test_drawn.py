@@ -12,7 +12,6 @@ from shown import numbers, numbers_of
 import rbcourse as rb
 from rbclassroom.figures import (
     FORMS,
-    described,
     lesson03,
     lesson04,
     lesson05,
@@ -25,6 +24,7 @@ from rbclassroom.figures import (
     lesson15,
     vectors,
 )
+from rbcourse.draw import described
 
 MARGINS = {
     "family": np.array(["random"] * 4 + ["Figure 5", "no turn", "no turn"]),
