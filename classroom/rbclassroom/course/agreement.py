@@ -27,13 +27,11 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from rbcourse.draw.display import PARTS
-
 Numbers: TypeAlias = NDArray[np.int_]
 BASE64 = r"base64,([A-Za-z0-9+/=]+)"
 LIVING = r'revive\(image, (\{"size":.*\})\);'
 PICTURE = re.compile(f"{LIVING}|{BASE64}")
-UNIT = 1 / PARTS
+UNIT = 1 / 8
 """The unit of coordinates in living pictures, in pixels."""
 
 

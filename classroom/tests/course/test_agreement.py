@@ -82,6 +82,10 @@ def test_rounding_in_an_interactive_picture_is_ignored(change):
     assert reconciled(living(), again) == (living() if change in ROUNDING else again)
 
 
+def test_positions_are_compared_in_display_units():
+    assert agreement.UNIT == 1 / PARTS
+
+
 def image(array):
     content = io.BytesIO()
     Image.fromarray(array).save(content, "png")
