@@ -27,7 +27,7 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbclassroom.explorers": {"rbcourse", "rbcourse.draw"}
     | {"rbclassroom.course", "rbclassroom.figures"},
     "rbclassroom.atlas": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
-    "rbclassroom.course": {"rbcourse", "rbcourse.draw", "rbclassroom"},
+    "rbclassroom.course": {"rbcourse", "rbclassroom"},
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbcourse", "rbcourse.draw"}
     | {"rbclassroom.course", "rbclassroom.explorers"},
