@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from rbcourse._numerics import BLOCK, Array, blocks, scaled
 
+GAP_ERROR = 4e-6  # of 1.8e6 matrices near s₂ = −s₃ or s₁ = s₂ = s₃, the largest error was 2e-6
 LEAST_ZETA = 3e-3  # in units of s₁ ‖M‖²; for smaller ζ, the result loses digits
 
 
@@ -53,14 +54,7 @@ def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
     if not 1e-30 < norm2.min() <= norm2.max() < 1e30:  # avoids overflow of norm2**6
         M[...] = scaled(M, axis=(0, 1))
         norm2 = _dots(M, M)
-    write_cofactors(M, C)
-    a, cof2, det = norm2 / 3, _dots(C, C), _dots(M[:1], C[:1])
-    r2 = np.maximum(a * a - cof2 / 3, 1e-200)
-    r = np.sqrt(r2)
-    cosine = np.clip((a * (3 * r2 - a * a) + det * det) / (2 * r2 * r), -1, 1)
-    x = a + r * (4 / (1 + np.tan(np.arccos(cosine) / 6) ** 2) - 2)  # a + 2 r cos(arccos(cosine)/3)
-    s1 = np.sqrt(x)
-    gap = np.sqrt(np.maximum(norm2 - x + 2 * det / s1, 0))
+    s1, gap, det = _eigenvalues(M, C, norm2)
     lam = s1 + gap
     zeta = gap * (s1 * lam + det / s1)
     np.multiply(M, lam, X)
@@ -74,6 +68,28 @@ def _project(M: Array, X: Array, C: Array) -> NDArray[np.bool_]:
     C *= 0.5 / (zeta * lam)
     right: NDArray[np.bool_] = zeta > LEAST_ZETA * s1 * norm2
     return right
+
+
+def _eigenvalues(M: Array, C: Array, norm2: Array) -> tuple[Array, Array, Array]:
+    """Return s₁, the gap s₂ + s₃, and det M; write the cofactors of M into C."""
+    write_cofactors(M, C)
+    a, cof2, det = norm2 / 3, _dots(C, C), _dots(M[:1], C[:1])
+    r2 = np.maximum(a * a - cof2 / 3, 1e-200)
+    r = np.sqrt(r2)
+    cosine = np.clip((a * (3 * r2 - a * a) + det * det) / (2 * r2 * r), -1, 1)
+    x = a + r * (4 / (1 + np.tan(np.arccos(cosine) / 6) ** 2) - 2)  # a + 2 r cos(arccos(cosine)/3)
+    s1 = np.sqrt(x)
+    return s1, np.sqrt(np.maximum(norm2 - x + 2 * det / s1, 0)), det
+
+
+def gaps(M: Array) -> Array:
+    """Return s₂ + s₃ with an error below `GAP_ERROR` ‖M‖, for bounds.
+
+    `rbcourse.projection.gap` has an error of a few eps ‖M‖, and takes 11 times as long for 500
+    matrices.
+    """
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        return _eigenvalues(M, np.empty_like(M), _dots(M, M))[1]
 
 
 def write_cofactors(M: Array, C: Array) -> None:

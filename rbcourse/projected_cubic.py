@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
+from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse.curves import (
@@ -78,7 +79,7 @@ class ProjectedPolynomial(Curve):
         """Return whether the margin may be 0, judged from 9 or, if in doubt, 65 sample times."""
         may = np.arange(self.count)
         for samples in (9, 65):
-            may = may[self.flat.take(may).least_margins(samples) < 0]
+            may = may[~(self.flat.take(may).least_margins(samples) > 0)]
         return bool(len(may))
 
     def least_margins(self, samples: int) -> Array:
@@ -87,8 +88,11 @@ class ProjectedPolynomial(Curve):
         least = np.empty(self.count)
         for part in blocks(self.count, BLOCK // samples):
             M = hermite(np.moveaxis(self.flat.ends[part], 1, 0), times)
-            change = np.linalg.norm(np.diff(M, axis=0), axis=(-2, -1)).max(axis=0)
-            least[part] = (gap(M) - change).min(axis=0)
+            M = np.ascontiguousarray(M.transpose(2, 3, 0, 1))
+            change = np.sqrt(np.sum(np.diff(M, axis=2) ** 2, axis=(0, 1))).max(axis=0)
+            size = np.sqrt(np.sum(M**2, axis=(0, 1)))
+            margins = gaps(M.reshape(3, 3, -1)).reshape(samples, -1) - GAP_ERROR * size
+            least[part] = (margins - change).min(axis=0)
         return least
 
     @property

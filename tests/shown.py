@@ -59,7 +59,7 @@ def record(folder):
     """Make saved figures write their displayed data into a folder, and check their layout."""
     from rbcourse.draw import animate, save
 
-    write_figure, render, frames = save.write_figure, animate.render, {}
+    write_figure, animate_, frames = save.write_figure, animate.animate, {}
 
     def written(fig, name, *files):
         pools = pooled([*frames.pop(fig, []), *by_names(fig.findobj())])
@@ -67,13 +67,13 @@ def record(folder):
         write_figure(fig, name, *files)
         check_looks(fig)
 
-    def rendered(fig, update, count):
+    def animated(fig, name, alt, update, count, *more):
         frames[fig] = [pair for i in range(count) for pair in by_names(update(i))]
-        return render(fig, update, count)
+        return animate_(fig, name, alt, update, count, *more)
 
     for module in (save, animate):
         module.write_figure = written
-    animate.render = rendered
+    animate.animate = animated
 
 
 def pooled(pairs):

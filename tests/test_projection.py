@@ -6,7 +6,7 @@ import oracles
 import pytest
 
 import rbcourse as rb
-from rbcourse import textbook
+from rbcourse import _foam, textbook
 from rbcourse._foam import nearest_rotations
 from rbcourse.projection import MANY
 
@@ -361,3 +361,16 @@ def test_threads_do_not_disturb_each_other():
     with ThreadPoolExecutor(2) as pool:
         for R, want in zip(pool.map(rb.project_so, 20 * [*stacks]), 20 * wants, strict=True):
             assert np.array_equal(R, want)
+
+
+def test_the_bound_of_a_gap_holds_near_the_singular_set_and_for_equal_values():
+    """The gap is the sum of the two smallest signed singular values."""
+    rng = np.random.default_rng(8)
+    U, V = (rb.sample_rotation(3000, rng=rng) for _ in "UV")
+    d = np.sort(rng.random((3000, 3)))[:, ::-1] * [1, 1, -1]
+    d[:1000, 2] = (10.0 ** rng.uniform(-12, 0, 1000) - 1) * d[:1000, 1]
+    d[1000:2000] = 1 + 10.0 ** rng.uniform(-12, 0, (1000, 1)) * rng.random((1000, 3))
+    M = U * d[:, None] @ V
+    exact = d.sum(axis=1) - d.max(axis=1)
+    found = _foam.gaps(np.ascontiguousarray(np.moveaxis(M, 0, -1)))
+    assert (np.abs(found - exact) <= _foam.GAP_ERROR * np.linalg.norm(d, axis=1)).all()

@@ -39,8 +39,9 @@ class Animation(Player):
     def save(self, path: str | Path) -> None:
         """Write the animation to a file as a GIF that repeats forever."""
         if not self.pictures:
-            raise ValueError("RBCOURSE_FIGURES is empty: the frames for a file were not drawn")
-        replace_file(path, gif(self.pictures, self.seconds))
+            why = "with gif=False, or if RBCOURSE_FIGURES is empty, the frames are not drawn"
+            raise ValueError(f"this animation has no frames: {why}")
+        replace_file(path, as_gif(self.pictures, self.seconds))
 
 
 def animate(
@@ -51,13 +52,17 @@ def animate(
     frames: int,
     seconds: float = 4.0,
     still: int = -1,
+    gif: bool = True,
 ) -> Animation:
-    """Return a figure as an animation; afterwards the figure shows the still frame."""
+    """Return a figure as an animation; afterwards the figure shows the still frame.
+
+    Without `gif`, the frames of a file are not drawn, which takes most of the time.
+    """
     if not name.isidentifier():
         raise ValueError(f"name: a word of letters, digits and _ is wanted, got {name!r}")
     if not 0 < frames <= 50 * seconds:
         raise ValueError(f"frames: 1 to 50 per second are wanted, got {frames} in {seconds} s")
-    files = os.environ.get("RBCOURSE_FIGURES") != ""  # see `save_figure`
+    files = gif and os.environ.get("RBCOURSE_FIGURES") != ""  # see `save_figure`
     rendered = render(fig, update, frames if files else 0)  # `render` also lays out the figure
     pictures = tuple(indexed(rendered)) if rendered else ()
     fig.set_layout_engine("none")  # keeps all artists in place
@@ -93,21 +98,24 @@ def save_animation(
     seconds: float = 4.0,
     still: int = -1,
     *,
+    gif: bool = True,
     pdf: bool = False,
 ) -> Animation:
     """Save an animation as GIF, its still frame as PNG, and its numbers as CSV.
 
-    The files go to the folder of `save_figure`. The same input always gives the same bytes. With
-    `pdf`, the still frame is also saved as PDF. The figure is closed.
+    The files go to the folder of `save_figure`. The same input always gives the same bytes. Without
+    `gif`, only a notebook shows the animation. With `pdf`, the still frame is also saved as PDF.
+    The figure is closed.
     """
     table = csv_text(data)
-    animation = animate(fig, name, alt, update, frames, seconds, still)
+    animation = animate(fig, name, alt, update, frames, seconds, still, gif)
     pictures = {"png": animation.shown}
     if animation.pictures:
-        pictures["gif"] = gif(animation.pictures, seconds)
+        pictures["gif"] = as_gif(animation.pictures, seconds)
     write_figure(fig, name, table, pictures, pdf)
     plt.close(fig)
-    return replace(animation, caption=caption(alt, f"{name}.gif, .png{', .pdf' * pdf}, .csv"))
+    files = f"{name}.{'gif, .' * gif}png{', .pdf' * pdf}, .csv"
+    return replace(animation, caption=caption(alt, files))
 
 
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:
@@ -142,7 +150,7 @@ def indexed(pictures: Sequence[Image.Image]) -> list[Image.Image]:
     return found
 
 
-def gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
+def as_gif(pictures: Sequence[Image.Image], seconds: float) -> bytes:
     """Return pictures as a GIF that repeats forever; each frame lasts a multiple of 10 ms."""
     content = io.BytesIO()
     ends = np.linspace(0, 100 * seconds, len(pictures) + 1).round().astype(int)

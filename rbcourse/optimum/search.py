@@ -66,9 +66,9 @@ class Limits:
     flat: float = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
     bend: float = 0.5  # rad: size of the bend
     refined: float = 3.0  # curves up to this cost ratio are lowered on more nodes
-    spun: tuple[float, ...] = (3.0, 1.05)  # spin is added twice, to curves up to these cost ratios
+    spun: tuple[float, ...] = (3.0, 1.15)  # spin is added twice, to curves up to these cost ratios
     worth_a_turn: float = 0.3  # no spin is added if the cost is below this share of a turn's cost
-    promising: float = 1.2  # curves above this cost ratio are dropped before more steps
+    promising: float = 1.3  # curves above this cost ratio are dropped before more steps
     starts: tuple[int, float] = (40, 5e-4)
     brief: tuple[int, float] = (4, 5e-4)  # steps for new curves, before most are dropped
     starts_of_bodies: tuple[int, float] = (20, 2e-3)

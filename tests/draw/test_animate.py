@@ -121,7 +121,7 @@ def test_the_gif_shows_each_frame_in_its_colours(saved):
 @pytest.mark.parametrize(("count", "seconds"), [(60, 4), (100, 1.99), (3, 1), (7, 0.5)])
 def test_a_gif_lasts_as_long_as_requested(count, seconds):
     shades = [Image.new("L", (4, 4), 2 * i) for i in range(count)]
-    with Image.open(io.BytesIO(animate.gif(shades, seconds))) as picture:
+    with Image.open(io.BytesIO(animate.as_gif(shades, seconds))) as picture:
         durations = [picture.seek(i) or picture.info["duration"] for i in range(picture.n_frames)]
     assert (len(durations), sum(durations)) == (count, round(1000 * seconds))
 
