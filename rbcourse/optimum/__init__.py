@@ -143,13 +143,13 @@ def minimum_torque_so3(
     Notes
     -----
     The method, errors, warnings and singular set are those of `minimum_acceleration_so3`. The curve
-    of a rod may not be the cheapest one, even if ``converged`` is True: of 600 rods with moments
-    (1, 6 to 10, up to 1 more), angles up to π and speeds up to 9, another optimiser found a curve
-    that is cheaper for 3, by 0.5, 3.5 and 6.3 %. For thin rods, the method often does not converge. A turn
-    about a principal axis is a stationary curve. A turn about the axis of the largest moment of
-    inertia may be a saddle. Then a curve that leaves the axis costs less; the search also tries
-    such curves. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c; see
-    `rbcourse.textbook.minimum_torque_so3`.
+    of a rod may not be the cheapest one, even if ``converged`` is True: for 3 of 600 rods with
+    moments (1, 6 to 10, up to 1 more), angles up to π and speeds up to 9, another optimiser found
+    a curve that is cheaper, by 0.5, 3.5 and 6.3 %. For thin rods, the method often does not
+    converge. A turn about a principal axis is a stationary curve. A turn about the axis of the
+    largest moment of inertia may be a saddle. Then a curve that leaves the axis costs less; the
+    search also tries such curves. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H =
+    c; see `rbcourse.textbook.minimum_torque_so3`.
 
     Examples
     --------
