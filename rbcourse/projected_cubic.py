@@ -101,7 +101,7 @@ class ProjectedPolynomial(Curve):
         least = self.least_margins(9)
         if (least > 1).all():  # the margin of a curve that stands still is 2
             return np.array([0.0, 0.5, 1.0])
-        doubtful = self.flat.take(np.flatnonzero(least < 0.25))
+        doubtful = self.flat.take(np.flatnonzero(~(least >= 0.25)))
         return near_margins(super().breakpoints, *doubtful._least_gap)
 
 

@@ -214,12 +214,14 @@ def described(sentence: str, data: Table) -> str:
 
 def _range(name: str, column: NDArray[np.float64]) -> str:
     """Return the first, the last, and further extreme values of a column as text."""
+    label, unit = name.removesuffix("]").rsplit(" [", 1)
     known = column[np.isfinite(column)]
+    if not len(known):
+        return f"{label} is not defined"
     # rounding errors differ between processors
     known = np.where(np.abs(known) < 1e-12 * max(1, np.abs(known).max()), 0, known)
     values = known[0], known[-1], known.min(), known.max()
     first, last, low, high = (f"{x:.3g}" for x in values)
-    label, unit = name.removesuffix("]").rsplit(" [", 1)
     said = f"{label} from {first} to {last}{'' if unit == '1' else f' {unit}'}"
     said += f", at least {low}" * (low not in (first, last))
     return said + f", at most {high}" * (high not in (first, last))

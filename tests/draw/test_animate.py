@@ -54,6 +54,11 @@ def test_no_frames_are_drawn_without_files(saved, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(ValueError, match="RBCOURSE_FIGURES is empty"):
         player.save("cube.gif")
+    monkeypatch.setenv("RBCOURSE_FIGURES", str(tmp_path))
+    fig, update = cube()
+    player = animate.save_animation(fig, "cube", TABLE, 'a "cube"', update, 12, 3, gif=False)
+    assert {path.name for path in tmp_path.iterdir()} == {"cube.png", "cube.csv"}
+    assert "<small>cube.png, .csv</small>" in player._repr_html_()
 
 
 def test_the_layout_is_the_same_with_and_without_files(tmp_path, monkeypatch):

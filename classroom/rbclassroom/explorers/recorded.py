@@ -14,7 +14,7 @@ import matplotlib
 import pooch
 
 import rbcourse
-from rbclassroom import explorers
+from rbclassroom import explorers, figures
 from rbclassroom.explorers.explorer import Explorer, numbers
 from rbclassroom.explorers.paths import JOINED
 from rbclassroom.figures import FORMS
@@ -131,8 +131,8 @@ def _stored(name: str) -> Path:
 def _version() -> str:
     """Return a digest of all code and styles on which a recorded explorer depends."""
     digest = hashlib.sha256(matplotlib.__version__.encode())
-    for folder in (Path(rbcourse.__file__).parent, Path(explorers.__file__).parent):
-        for path in sorted(folder.rglob("*.*")):
+    for folder in (*rbcourse.__path__, *explorers.__path__, *figures.__path__):
+        for path in sorted(Path(folder).rglob("*.*")):
             if path.suffix in (".py", ".js", ".mplstyle", ".ttf"):
                 digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

@@ -99,3 +99,15 @@ def test_records_have_the_same_bytes_each_time():
     assert "These controls are fixed here" not in one.caption
     with pytest.raises(ValueError, match="120"):
         recorded.record(theta, "theta", {"angle": [60.0]})
+
+
+def test_an_explorer_is_recorded_once_until_its_code_changes(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(recorded.pooch, "os_cache", lambda _: tmp_path)
+    monkeypatch.setattr(recorded, "record", lambda *given: asked.append(given[1]) or made("theta"))
+    versions = iter(["one", "one", "two"])
+    monkeypatch.setattr(recorded, "_version", lambda: next(versions))
+    monkeypatch.setattr(type(made("theta")), "_repr_html_", lambda _: "<figure>", raising=False)
+    for count in (1, 1, 2):
+        assert recorded.living("theta") == "<figure>"
+        assert asked == ["theta_explorer"] * count
