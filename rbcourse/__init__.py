@@ -3,7 +3,7 @@
 The package exports the names for everyday use. Other names are only in its modules: inner products
 in `rbcourse.metrics`, the connection in `rbcourse.connection`, planar motions and arms in
 `rbcourse.planar` and `rbcourse.arm`, naive samplers and tests of uniformity in `rbcourse.sampling`,
-and the timings θ and f in `rbcourse.projected_line`. The module `rbcourse.textbook` has short
+and the timings θ and f in `rbcourse.straight_line`. The module `rbcourse.textbook` has short
 versions of the main algorithms.
 
 The line "Source" of a docstring cites the equations that the function implements. BK is Belta and
@@ -29,18 +29,8 @@ Angles are in rad, and lengths in m. Angular velocities and twists (ω, v) are i
 unit of time.
 """
 
-from rbcourse import arm, connection, files, metrics, planar, projected_line, quaternion, sampling
+from rbcourse import arm, connection, files, metrics, planar, quaternion, sampling, straight_line
 from rbcourse._numerics import Array
-from rbcourse.bezier import bezier_long_so3, bezier_so3, corrected_bezier_so3, cumulative_bezier_so3
-from rbcourse.closed_forms import (
-    CLOSED_FORMS,
-    cayley_cubic_so3,
-    exponential_cubic_long_so3,
-    exponential_cubic_so3,
-    exponential_quintic_so3,
-    normal_cubic_so3,
-    quaternion_cubic_so3,
-)
 from rbcourse.connection import geodesic_flow
 from rbcourse.conversions import (
     matrix_from_quaternion,
@@ -52,18 +42,48 @@ from rbcourse.conversions import (
     zyx_from_matrix,
     zyx_from_quaternion,
 )
-from rbcourse.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
-from rbcourse.curves import Curve, Ends, geodesic_so3, retime
-from rbcourse.excess import excess_estimate
-from rbcourse.files import read_path, write_path
-from rbcourse.metrics import METRIC_SE3, METRIC_SO3
-from rbcourse.motions import (
+from rbcourse.curves.bezier import (
+    bezier_long_so3,
+    bezier_so3,
+    corrected_bezier_so3,
+    cumulative_bezier_so3,
+)
+from rbcourse.curves.chain import (
+    Chain,
+    chain,
+    projected_spline_se3,
+    projected_spline_so3,
+    quaternion_spline_so3,
+)
+from rbcourse.curves.closed import (
+    CLOSED_FORMS,
+    cayley_cubic_so3,
+    exponential_cubic_long_so3,
+    exponential_cubic_so3,
+    exponential_quintic_so3,
+    normal_cubic_so3,
+    quaternion_cubic_so3,
+)
+from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
+from rbcourse.curves.curve import Curve, Ends, geodesic_so3, retime
+from rbcourse.curves.projected_line import projected_line_so3
+from rbcourse.curves.projected_polynomial import (
+    ProjectedPolynomial,
+    projected_cubic_so3,
+    projected_quintic_so3,
+    weighted_cubic_so3,
+)
+from rbcourse.curves.rigid import (
     geodesic_se3,
     minimum_acceleration_se3,
     projected_cubic_se3,
     screw_from_pose,
     screw_se3,
 )
+from rbcourse.curves.timing import Timed, fastest, limits_used
+from rbcourse.curves.velocities import bessel_velocities, spline_velocities
+from rbcourse.files import read_path, write_path
+from rbcourse.metrics import METRIC_SE3, METRIC_SO3
 from rbcourse.optimum import (
     ConvergenceError,
     Optimum,
@@ -72,7 +92,8 @@ from rbcourse.optimum import (
     minimum_torque_so3,
     stationary_so3,
 )
-from rbcourse.optimum.splines import (
+from rbcourse.optimum.excess import excess_estimate
+from rbcourse.optimum.many_poses import (
     OptimalChain,
     is_local_minimum,
     minimum_acceleration_spline_se3,
@@ -80,20 +101,6 @@ from rbcourse.optimum.splines import (
     minimum_jerk_spline_so3,
     minimum_torque_spline_so3,
 )
-from rbcourse.paths import (
-    Chain,
-    chain,
-    projected_spline_se3,
-    projected_spline_so3,
-    quaternion_spline_so3,
-)
-from rbcourse.projected_cubic import (
-    ProjectedPolynomial,
-    projected_cubic_so3,
-    projected_quintic_so3,
-    weighted_cubic_so3,
-)
-from rbcourse.projected_line import projected_line_so3
 from rbcourse.projection import (
     distance_to_so,
     is_se,
@@ -135,8 +142,6 @@ from rbcourse.so3 import (
     right_jacobian_so3,
     vee_so3,
 )
-from rbcourse.timing import Timed, fastest, limits_used
-from rbcourse.velocities import bessel_velocities, spline_velocities
 
 __version__ = "2.0.0a1"
 
@@ -258,7 +263,7 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "files",
     "metrics",
     "planar",
-    "projected_line",
     "quaternion",
     "sampling",
+    "straight_line",
 ]

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite
 from rbcourse._numerics import EPS, Array
+from rbcourse._quaternions import axis_and_angle, quaternion_of, rotation_vector_of
 from rbcourse._taylor import matrix
 from rbcourse._valid import as_rotations, as_unit_quaternions
-from rbcourse.quaternion import canonical_quaternion
 
 
 def matrix_from_quaternion(q: ArrayLike) -> Array:
@@ -60,14 +60,6 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     return quaternion_of(as_rotations("R", R))
 
 
-def quaternion_of(R: Array) -> Array:
-    """Compute `quaternion_from_matrix` without checks."""
-    four_qq = _four_outer(R)
-    largest = np.argmax(np.diagonal(four_qq, axis1=-2, axis2=-1), axis=-1)
-    row = np.take_along_axis(four_qq, largest[..., None, None], axis=-2)[..., 0, :]
-    return canonical_quaternion(row / np.linalg.norm(row, axis=-1, keepdims=True))
-
-
 def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     """Return the quaternion (cos(a/2), sin(a/2) w/a) of the rotation by a = ‖w‖ about w.
 
@@ -92,20 +84,6 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     return np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=-1)
 
 
-def axis_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return the unit vector n, shape (..., 3), and a ≥ 0, shape (..., 1), with w = a n.
-
-    If w is 0, n and a are 0. If the norm overflows, ValueError is raised.
-    """
-    with np.errstate(over="ignore"):
-        angle = np.linalg.norm(w, axis=-1, keepdims=True)
-        extreme = ~((angle > 1e-150) & (angle < 1e150))[..., 0]
-        if extreme.any():  # w is zero, or its square overflows or underflows
-            angle[extreme] = np.hypot.reduce(w[extreme], axis=-1, keepdims=True)
-            as_finite("norm of w", angle[..., 0])
-    return w / np.where(angle == 0, 1.0, angle), angle
-
-
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Return the shortest rotation vector of a unit quaternion; q and −q give the same vector.
 
@@ -127,15 +105,6 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     array([0.        , 0.        , 1.57079633])
     """
     return rotation_vector_of(as_unit_quaternions("q", q))
-
-
-def rotation_vector_of(q: Array) -> Array:
-    """Compute `rotation_vector_from_quaternion` without checks."""
-    q = canonical_quaternion(q)
-    w, v = q[..., :1], q[..., 1:]
-    sine = np.linalg.norm(v, axis=-1, keepdims=True)
-    turning = sine > 0
-    return v * np.where(turning, 2 * np.arctan2(sine, w) / np.where(turning, sine, 1.0), 2.0)
 
 
 def matrix_from_zyx(angles: ArrayLike) -> Array:
@@ -268,15 +237,3 @@ def _turn_about(axis: int, angle: Array) -> Array:
     R[..., j, i] = np.sin(angle)
     R[..., i, j] = -R[..., j, i]
     return R
-
-
-def _four_outer(R: Array) -> Array:
-    """Return 4 q qᵀ, shape (..., 4, 4), for the quaternion q of R."""
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(R, (-2, -1), (0, 1))
-    rows = [
-        [1 + a + e + i, h - f, c - g, d - b],
-        [h - f, 1 + a - e - i, b + d, c + g],
-        [c - g, b + d, 1 - a + e - i, f + h],
-        [d - b, c + g, f + h, 1 - a - e + i],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))

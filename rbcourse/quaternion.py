@@ -15,6 +15,7 @@ from rbcourse._checks import (
     first_index,
 )
 from rbcourse._numerics import EPS, Array
+from rbcourse._quaternions import canonical
 from rbcourse._taylor import multiply
 from rbcourse._taylor import slerp as slerp_jet
 from rbcourse._valid import as_unit_quaternions
@@ -178,13 +179,7 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     array([[ 0.6,  0. , -0.8,  0. ],
            [ 0. ,  1. ,  0. ,  0. ]])
     """
-    q = as_finite("q", q, 4)
-    w, v = q[..., :1], q[..., 1:]
-    half_turn = np.abs(w) < 4 * EPS
-    size = np.abs(v)
-    first = np.argmax(size > size.max(axis=-1, keepdims=True) - 1e-8, axis=-1)[..., None]
-    sign = np.where(half_turn, np.take_along_axis(v, first, axis=-1), w)
-    return np.concatenate([np.where(half_turn, 0.0, w), v], axis=-1) * np.where(sign < 0, -1.0, 1.0)
+    return canonical(as_finite("q", q, 4))
 
 
 def continuous_quaternions(q: ArrayLike) -> Array:

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._numerics import Array, sinc
+from rbcourse._quaternions import axis_and_angle, quaternion_of, rotation_vector_of
 from rbcourse._valid import as_rotations
-from rbcourse.conversions import axis_and_angle, quaternion_of, rotation_vector_of
 
 BASIS_SO3 = np.array(
     [

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rbcourse._numerics import Array
-from rbcourse.bezier import corrected_bezier_so3
+from rbcourse.curves.bezier import corrected_bezier_so3
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
 
@@ -157,7 +157,7 @@ def minimum_torque_so3(
     × G w. Here p = G (τ' + w × τ) − G w × τ, and c is an unknown constant. ‖σ‖ must be below 2π. If
     the solver fails, a RuntimeError names the reason. The solver may find a stationary curve that
     is not the cheapest.
-    Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`, with M = I).
+    Source: beyond BK 4 (see `rbcourse.curves.functionals.Effort`, with M = I).
 
     Examples
     --------

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rbcourse.optimum.chebyshev import grid
-from rbcourse.optimum.second_variation import polynomials
+from rbcourse._chebyshev import grid
+from rbcourse.optimum._second_variation import polynomials
 
 NODES = 33
 

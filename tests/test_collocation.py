@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse.optimum import collocation
-from rbcourse.optimum.chebyshev import grid
-from rbcourse.optimum.functionals import Effort
+from rbcourse._chebyshev import grid
+from rbcourse.curves.functionals import Effort
+from rbcourse.optimum import _collocation as collocation
 
 
 @pytest.mark.parametrize("of_torque", [False, True])

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 import rbcourse as rb
 from rbcourse._hermite import hermite
-from rbcourse.projected_line import theta
+from rbcourse.straight_line import theta
 
 I3, I4, REST = np.eye(3), np.eye(4), np.zeros(3)
 BOOK = np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]])

@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.curves import SingularTime
-from rbcourse.projected_line import f
+from rbcourse.curves.curve import SingularTime
+from rbcourse.straight_line import f
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(61)

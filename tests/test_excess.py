@@ -9,8 +9,8 @@ import pytest
 
 import rbcourse as rb
 from rbclassroom.atlas import random_problems
-from rbcourse.bezier import bezier_deviation, seen_from_the_middle
-from rbcourse.curves import Ends
+from rbcourse.curves.bezier import bezier_deviation, seen_from_the_middle
+from rbcourse.curves.curve import Ends
 
 ROOT = Path(__file__).parents[1]
 FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)

@@ -5,7 +5,7 @@ import oracles
 import pytest
 from numpy.polynomial import Polynomial
 
-from rbcourse.optimum.functionals import BallAcceleration, Effort, Jerk
+from rbcourse.curves.functionals import BallAcceleration, Effort, Jerk
 
 G = np.array([[[2.0, 0.3, -0.1], [0.3, 1.5, 0.2], [-0.1, 0.2, 1.1]]])
 every_functional = pytest.mark.parametrize(

@@ -23,8 +23,8 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
-from rbcourse.optimum import search
-from rbcourse.optimum.chebyshev import grid, interpolation
+from rbcourse._chebyshev import grid, interpolation
+from rbcourse.optimum import _search as search
 
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
 TIMES = np.linspace(0, 1, 101)

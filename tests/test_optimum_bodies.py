@@ -10,11 +10,11 @@ from optima import BOOK, COSTS, I3, OPTIMA, REST, bodies, deviation, random_prob
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
+from rbcourse._chebyshev import grid
 from rbcourse._hermite import hermite
-from rbcourse.curves import Ends
-from rbcourse.optimum.chebyshev import grid
-from rbcourse.optimum.collocation import relax_ball
-from rbcourse.optimum.search import ball
+from rbcourse.curves.curve import Ends
+from rbcourse.optimum._collocation import relax_ball
+from rbcourse.optimum._search import ball
 
 MANY = random_problems(800, 50)
 # For these ends the short way costs 3504, and Bézier's curves cost 603 and 553.

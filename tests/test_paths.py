@@ -9,7 +9,7 @@ import oracles
 import pytest
 
 import rbcourse as rb
-from rbcourse.motions import RigidMotion, rigid_motion
+from rbcourse.curves.rigid import RigidMotion, rigid_motion
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(110)

@@ -4,7 +4,7 @@ import oracles
 import pytest
 
 import rbcourse as rb
-from rbcourse import projected_line as line
+from rbcourse import straight_line as line
 
 EPS = np.finfo(float).eps
 GRID = np.meshgrid(awkward.LINE_TIMES, awkward.LINE_ANGLES, indexing="ij")

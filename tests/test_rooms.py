@@ -211,7 +211,7 @@ def test_clients_use_exported_names_only():
         ("from rbcourse.so3 import exp_so3", ["so3.exp_so3"]),
         ("from rbcourse._numerics import Array", ["_numerics.Array"]),
         ("from rbcourse.planar import as_states", ["planar.as_states"]),
-        ("import rbcourse.optimum.search", ["optimum.search.*"]),
+        ("import rbcourse.optimum._search", ["optimum._search.*"]),
         ("from rbcourse.draw.save import save_figure, _text", ["draw.save._text"]),
         ("import rbcourse as rb\nrb.search.ball", ["search"]),
         ("import rbcourse as rb\nrb.files.csv_lines", ["files.csv_lines"]),

@@ -4,11 +4,11 @@ import pytest
 
 import rbcourse as rb
 from rbclassroom.atlas import random_problems
-from rbcourse.curves import Ends, with_inertia
+from rbcourse._chebyshev import grid
+from rbcourse.curves.curve import Ends, with_inertia
 from rbcourse.optimum import optimum_of
-from rbcourse.optimum.chebyshev import grid
-from rbcourse.optimum.search import LIMITS, ball, body, jerk
-from rbcourse.optimum.second_variation import polynomials
+from rbcourse.optimum._search import LIMITS, ball, body, jerk
+from rbcourse.optimum._second_variation import polynomials
 from rbcourse.so3 import hat, vee
 
 pytestmark = pytest.mark.source("beyond BK 15")

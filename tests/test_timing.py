@@ -12,7 +12,8 @@ import pytest
 from scipy.integrate import quad
 
 import rbcourse as rb
-from rbcourse import textbook, timing
+from rbcourse import textbook
+from rbcourse.curves import timing
 
 I4, REST = np.eye(4), np.zeros(3)
 LEMNISCATE = 2.62205755429212  # B(1/4, 1/2)/2

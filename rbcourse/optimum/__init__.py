@@ -14,14 +14,14 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._checks import as_time
 from rbcourse._numerics import Array
-from rbcourse.curves import Curve, Ends, retime, weighted_sums, with_inertia
-from rbcourse.optimum.chebyshev import along, chebyshev, grid, primitives
-from rbcourse.optimum.collocation import EXACT, Failure, Solution, orthogonal
-from rbcourse.optimum.functionals import Functional
-from rbcourse.optimum.search import LIMITS, Task, ball, body, cheapest, jerk
-from rbcourse.projected_cubic import ends_of_quintic
+from rbcourse.curves.curve import Curve, Ends, retime, weighted_sums, with_inertia
+from rbcourse.curves.functionals import Functional
+from rbcourse.curves.projected_polynomial import ends_of_quintic
+from rbcourse.optimum._collocation import EXACT, Failure, Solution, orthogonal
+from rbcourse.optimum._search import LIMITS, Task, ball, body, cheapest, jerk
 
 _FOUND = [
     ("converged", bool),
@@ -44,7 +44,7 @@ def minimum_acceleration_so3(
     """Return the minimum-acceleration curve with these ends, for a ball or for any body.
 
     Source: BK (19), BK 6.2, BK Prop. 7; beyond BK 3 (for bodies, see
-    `rbcourse.optimum.functionals.Effort`).
+    `rbcourse.curves.functionals.Effort`).
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def minimum_torque_so3(
 ) -> Optimum:
     """Return the curve with these ends and the least integral of squared torque.
 
-    Source: beyond BK 4 (see `rbcourse.optimum.functionals.Effort`).
+    Source: beyond BK 4 (see `rbcourse.curves.functionals.Effort`).
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def minimum_jerk_so3(
 ) -> Optimum:
     """Return the minimum-jerk curve with these ends.
 
-    Source: beyond BK 5 (see `rbcourse.optimum.functionals.Jerk`).
+    Source: beyond BK 5 (see `rbcourse.curves.functionals.Jerk`).
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from rbclassroom.explorers.names import new_name, put_name
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS
 from rbcourse.draw.spheres import AZIMUTH, ELEVATION
-from rbcourse.projected_line import line_singular_value, theta
+from rbcourse.straight_line import line_singular_value, theta
 
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 import rbcourse as rb
 from rbcourse.files import replace_file
-from rbcourse.projected_line import theta
+from rbcourse.straight_line import theta
 
 FOLDER = Path("notebooks", "slides")
 STEP = 0.1

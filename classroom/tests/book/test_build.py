@@ -218,7 +218,7 @@ def test_the_ledger_has_a_row_for_every_key(source):
     page = source("ledger.md")
     assert page.count('class="row"') == len(WHAT) + len(MISPRINTS)
     cells = row(page, "bk-eq-16")
-    assert "package/projected_line.html#rbcourse.projected_line.theta" in cells[2]
+    assert "package/projected_line.html#rbcourse.straight_line.theta" in cells[2]
     assert "code/tests/test_projected_line.html#" in cells[3]
     assert "lessons/06_geodesics.html#s6" in cells[4]
     assert "figures.html#lesson06_chord" in cells[5]

@@ -137,7 +137,7 @@ def test_the_three_books_agree_with_the_package():
 
 @pytest.mark.source("BK Prop. 6", "BK Cor. 1")
 def test_the_projected_line_agrees_with_the_package():
-    t, f = np.linspace(0, 1, 101), rb.projected_line
+    t, f = np.linspace(0, 1, 101), rb.straight_line
     for v, said, artists in sweep("theta", angle=100.0, t=0.3):
         a, now = np.radians(v["angle"]), v["t"]
         first, last = ends = 1j * np.exp([0.5j * a, -0.5j * a])

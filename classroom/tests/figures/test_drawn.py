@@ -106,7 +106,7 @@ def test_histograms_count_all_draws_and_show_the_exact_distributions():
 @pytest.mark.source("BK Fig. 2", "BK Fig. 3")
 def test_the_curves_of_a_family_have_the_colours_of_its_surface():
     angle, t = np.meshgrid(np.arange(1, 23) * np.pi / 24, np.linspace(0, 1, 5), indexing="ij")
-    table = {"angle [rad]": angle, "t [1]": t, "theta [1]": rb.projected_line.theta(t, angle)}
+    table = {"angle [rad]": angle, "t [1]": t, "theta [1]": rb.straight_line.theta(t, angle)}
     ax, space = axes_of(None, "3d")
     lesson06.draw_family(ax, table)
     rows = {"30°": 3, "90°": 11, "150°": 19, "165°": 21}

@@ -9,12 +9,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rbcourse._chebyshev import grid
 from rbcourse._checks import as_inertia, as_positive, as_single, check_broadcast
 from rbcourse._numerics import EPS, Array, blocks
-from rbcourse.curves import Curve, SingularTime, which_curve
-from rbcourse.optimum.chebyshev import grid
-from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
-from rbcourse.paths import smooth_parts
+from rbcourse.curves.chain import smooth_parts
+from rbcourse.curves.curve import Curve, SingularTime, which_curve
+from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
 
 _TOGETHER = 2000  # panels evaluated together, which bounds the memory
 _HALVINGS = 30

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rbcourse._chebyshev import along, grid, interpolation, primitives, tails
 from rbcourse._numerics import Array, blocks, scaled
-from rbcourse.optimum.chebyshev import along, grid, interpolation, primitives, tails
-from rbcourse.optimum.functionals import BallAcceleration, Functional
+from rbcourse.curves.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
 
 STEPS = 25

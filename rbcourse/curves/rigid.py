@@ -20,10 +20,10 @@ from rbcourse._checks import (
 from rbcourse._hermite import hermite_stack, stack_terms
 from rbcourse._numerics import EPS, Array, matvec
 from rbcourse._valid import as_poses
-from rbcourse.curves import Curve, Ends, geodesic_so3, with_inertia
+from rbcourse.curves.curve import Curve, Ends, geodesic_so3, with_inertia
+from rbcourse.curves.projected_polynomial import ProjectedPolynomial, projected_cubic, watched
 from rbcourse.optimum import solve
-from rbcourse.optimum.search import ball, body
-from rbcourse.projected_cubic import ProjectedPolynomial, projected_cubic, watched
+from rbcourse.optimum._search import ball, body
 from rbcourse.se3 import exp_se3, inverse_se3, join, log_se3, split
 
 

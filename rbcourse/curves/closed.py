@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import EPS, Array, matvec
+from rbcourse._quaternions import quaternion_of
 from rbcourse._taylor import (
     Jet,
     angular_velocity,
     cross,
     exp,
 )
-from rbcourse.bezier import bezier_so3, corrected_bezier_so3, cumulative_bezier_so3
-from rbcourse.conversions import quaternion_of
-from rbcourse.curves import (
+from rbcourse.curves.bezier import bezier_so3, corrected_bezier_so3, cumulative_bezier_so3
+from rbcourse.curves.curve import (
     Curve,
     Ends,
     QuaternionCurve,
@@ -35,7 +35,7 @@ from rbcourse.curves import (
     which_curve,
     with_inertia,
 )
-from rbcourse.projected_cubic import ends_of_quintic, projected_cubic_so3
+from rbcourse.curves.projected_polynomial import ends_of_quintic, projected_cubic_so3
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import hat, log, right_jacobian_inverse_so3
 

@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rbcourse._chebyshev import along, chebyshev, grid
 from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, matvec
-from rbcourse.curves import Ends
-from rbcourse.optimum.chebyshev import along, chebyshev, grid
-from rbcourse.optimum.collocation import TOGETHER, cayley
-from rbcourse.optimum.functionals import Functional
+from rbcourse.curves.curve import Ends
+from rbcourse.curves.functionals import Functional
+from rbcourse.optimum._collocation import TOGETHER, cayley
 from rbcourse.so3 import exp_so3, hat, log, vee
 
 FAST = 4 * np.pi  # if ‖w0‖ + ‖w1‖ is larger, all four of the `starts` are used

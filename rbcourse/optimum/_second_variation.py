@@ -31,9 +31,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rbcourse._chebyshev import Grid, grid
 from rbcourse._numerics import Array, matvec
 from rbcourse.optimum import Optimum
-from rbcourse.optimum.chebyshev import Grid, grid
 from rbcourse.so3 import hat
 
 _PENALTY = 1e4  # the penalty is this number times (‖c‖ + 1) ‖M‖

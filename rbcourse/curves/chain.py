@@ -1,7 +1,7 @@
 """Curves through many poses, composed of two-point curves.
 
-The velocities of the splines make the accelerations continuous (see `rbcourse.velocities`). Optimal
-splines are in `rbcourse.optimum.splines`.
+The velocities of the splines make the accelerations continuous (see `rbcourse.curves.velocities`).
+Optimal splines are in `rbcourse.optimum.many_poses`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import BLOCK, EPS, Array, blocks, matvec
 from rbcourse._valid import as_poses, as_rotations
-from rbcourse.closed_forms import quaternion_cubic_so3
-from rbcourse.curves import Curve, SingularTime
-from rbcourse.motions import RigidMotion, projected_cubic_se3, rigid_motion
-from rbcourse.projected_cubic import projected_cubic_so3, weighted_cubic_so3
-from rbcourse.velocities import (
+from rbcourse.curves.closed import quaternion_cubic_so3
+from rbcourse.curves.curve import Curve, SingularTime
+from rbcourse.curves.projected_polynomial import projected_cubic_so3, weighted_cubic_so3
+from rbcourse.curves.rigid import RigidMotion, projected_cubic_se3, rigid_motion
+from rbcourse.curves.velocities import (
     PathEnds,
     as_ends,
     checked_path,

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import first_index
 from rbcourse._numerics import Array, matvec
+from rbcourse._quaternions import quaternion_of
 from rbcourse._taylor import (
     Jet,
     exp,
@@ -16,8 +17,8 @@ from rbcourse._taylor import (
     slerp,
     times,
 )
-from rbcourse.conversions import quaternion_from_rotation_vector, quaternion_of
-from rbcourse.curves import (
+from rbcourse.conversions import quaternion_from_rotation_vector
+from rbcourse.curves.curve import (
     Ends,
     QuaternionCurve,
     identity,

@@ -48,8 +48,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_finite, as_inertia, as_positive, as_single, as_time
 from rbcourse._numerics import Array, blocks, cross, matvec, reported
-from rbcourse.curves import Curve
-from rbcourse.paths import Chain, evaluate_legs
+from rbcourse.curves.chain import Chain, evaluate_legs
+from rbcourse.curves.curve import Curve
 
 REFINEMENTS = 3  # how often the cells of a leg are halved if it exceeds a limit
 TOLERANCE = 1e-4  # the share by which a limit may be exceeded

@@ -12,7 +12,7 @@ from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import BLOCK, Array, blocks, cross
-from rbcourse.curves import (
+from rbcourse.curves.curve import (
     Curve,
     Ends,
     check_defined,

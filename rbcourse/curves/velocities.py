@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_inertia, as_single
 from rbcourse._numerics import Array, matvec
-from rbcourse.conversions import quaternion_of
+from rbcourse._quaternions import quaternion_of
 from rbcourse.metrics import weight_of
 from rbcourse.se3 import check_path
 from rbcourse.so3 import hat, log, right_jacobian_so3, vee

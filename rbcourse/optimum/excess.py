@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from rbcourse._chebyshev import grid, tails
 from rbcourse._numerics import Array, blocks
-from rbcourse.cost import check_curve, summed
-from rbcourse.curves import Curve
-from rbcourse.optimum.chebyshev import grid, tails
-from rbcourse.optimum.second_variation import on_each_axis, polynomials, products
-from rbcourse.paths import smooth_parts
+from rbcourse.curves.chain import smooth_parts
+from rbcourse.curves.cost import check_curve, summed
+from rbcourse.curves.curve import Curve
+from rbcourse.optimum._second_variation import on_each_axis, polynomials, products
 from rbcourse.so3 import hat
 
 _NODES, _BUMPS = 33, 12

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from rbcourse._chebyshev import grid
 from rbcourse._numerics import EPS, Array
-from rbcourse.bezier import corrected_bezier_so3
-from rbcourse.curves import Ends
-from rbcourse.optimum.chebyshev import grid
-from rbcourse.optimum.collocation import (
+from rbcourse.curves.bezier import corrected_bezier_so3
+from rbcourse.curves.curve import Ends
+from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
+from rbcourse.optimum._collocation import (
     BallStationary,
     Equations,
     Failure,
@@ -26,8 +27,7 @@ from rbcourse.optimum.collocation import (
     relax,
     relax_ball,
 )
-from rbcourse.optimum.functionals import BallAcceleration, Effort, Functional, Jerk
-from rbcourse.optimum.guesses import (
+from rbcourse.optimum._guesses import (
     SAME,
     between_free_motions,
     leading_sign,
