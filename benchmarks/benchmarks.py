@@ -60,11 +60,11 @@ def geodesic(n, rng):
     """Evaluate a geodesic at n times; making the curve is not timed."""
     R0, t = rb.sample_rotation(rng=rng), rng.random(n)
     R1 = R0 @ rb.exp_so3([1, -1, 1.5])
-    ours, both = rb.geodesic_so3(R0, R1), Rotation.from_matrix([R0, R1])
+    ours, both = rb.geodesic(R0, R1), Rotation.from_matrix([R0, R1])
     theirs, xyzw = Slerp([0, 1], both), both.as_quat()
     batch = partial(quaternion_slerp_batch, *np.roll(xyzw, 1, axis=1), t, shortest_path=True)
     yield OURS, lambda: ours(t)
-    yield "textbook", lambda: textbook.geodesic_so3(R0, R1, t)
+    yield "textbook", lambda: textbook.geodesic(R0, R1, t)
     yield "SciPy", lambda: theirs(t).as_matrix()
     yield "SciPy, as Rotation", lambda: theirs(t)
     yield "pytransform3d", lambda: matrices_from_quaternions(batch())
@@ -78,7 +78,7 @@ def geodesic(n, rng):
 def projected_cubic(n, rng, orders):
     """Evaluate a projected cubic, with velocity and acceleration if `orders` is 3, at n times."""
     t, (R0, R1, w0, w1), knots = rng.random(n), ENDS["5"], np.linspace(0, 1, 5)
-    ours, theirs = rb.projected_cubic_so3(*ENDS["5"]), textbook.projected_cubic_so3
+    ours, theirs = rb.projected_cubic(*ENDS["5"]), textbook.projected_cubic
     spline = RotationSpline(knots, Rotation.from_matrix(ours(knots)))
     cubic = textbook.cubic_coefficients(R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1))
 
@@ -124,7 +124,7 @@ def chain_of_poses(n, rng, leg):
 def fastest_timing(n, rng):
     """Find the fastest timing of one leg, with limits for each component of the acceleration."""
     A1, s = rb.exp_se3([0.6, -0.4, 0.5, 0.3, 0.7, -0.2]), np.linspace(0, 1, 1001)
-    leg = rb.geodesic_se3(np.eye(4), A1)
+    leg = rb.geodesic(np.eye(4), A1)
     yield OURS, lambda: rb.fastest(leg, angular_acceleration=3 * [4], acceleration=3 * [3]).duration
 
     def by_toppra():
@@ -146,10 +146,10 @@ def fastest_timing(n, rng):
 
 def one_optimum(n, rng, case):
     """Solve one problem of the paper (BK), and compute 101 rotations; textbook uses `solve_bvp`."""
-    yield OURS, lambda: rb.minimum_acceleration_so3(*ENDS[case])(MOMENTS)
+    yield OURS, lambda: rb.minimum_acceleration(*ENDS[case])(MOMENTS)
     yield "textbook, shooting", lambda: textbook.shoot(*ENDS[case], MOMENTS)
-    yield "rbcourse, projected cubic", lambda: rb.projected_cubic_so3(*ENDS[case])(MOMENTS)
-    yield "textbook", lambda: textbook.minimum_acceleration_so3(*ENDS[case], MOMENTS)[0]
+    yield "rbcourse, projected cubic", lambda: rb.projected_cubic(*ENDS[case])(MOMENTS)
+    yield "textbook", lambda: textbook.minimum_acceleration(*ENDS[case], MOMENTS)[0]
 
 
 ALL, SOME = tuple(10**k for k in range(7)), (1, 1000, 10**6)
@@ -162,8 +162,8 @@ TASKS = [  # the name of the task, the case, the numbers of items, and the funct
     ("random quaternions", "", ALL, random_samples, "quaternion", "quat", "random_unitquat"),
     ("closed forms at N times", "", SOME, closed_forms, 1),
     ("closed forms with derivatives", "", SOME, closed_forms, 3),
-    ("chain at N times", "projected cubics", SOME, chain_of_poses, rb.projected_cubic_se3),
-    ("chain at N times", "geodesics", SOME, chain_of_poses, rb.geodesic_se3),
+    ("chain at N times", "projected cubics", SOME, chain_of_poses, rb.projected_cubic),
+    ("chain at N times", "geodesics", SOME, chain_of_poses, rb.geodesic),
     ("fastest timing", "one leg", (1,), fastest_timing),
     *(("optimum, one problem", case, (1,), one_optimum, case) for case in ENDS),
 ]

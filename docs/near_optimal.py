@@ -211,7 +211,7 @@ def deviations():
     """Return the third-order deviation of each closed form from the optimum."""
     best = times(-1, optimum())
     curves = {
-        "projected_cubic_so3": projection(),
+        "projected_cubic": projection(),
         "exponential_cubic_so3": exponential(),
         "bezier_so3": bezier(),
         "quaternion_cubic_so3": quaternion(),

@@ -1,126 +1,87 @@
 """Rigid-body motion: rotations, poses, projections, and curves through them.
 
-The package exports the names for everyday use. Other names are only in its modules: inner products
-in `rbcourse.metrics`, the connection in `rbcourse.connection`, planar motions and arms in
-`rbcourse.planar` and `rbcourse.arm`, naive samplers and tests of uniformity in `rbcourse.sampling`,
-and the timings θ and f in `rbcourse.straight_line`. The module `rbcourse.textbook` has short
-versions of the main algorithms.
+To do this                                   call this
+-------------------------------------------  ---------------------------------------------------
+make rotations, poses                        exp_so3, matrix_from_quaternion, matrix_from_zyx;
+                                             pose_from_components, pose_from_coordinates, exp_se3
+take them apart                              log_so3, quaternion_from_matrix, zyx_from_matrix;
+                                             components_from_pose, coordinates_from_pose, log_se3
+compare, invert, change frames               angle_between, inverse_se3, adjoint_se3
+repair a matrix that is nearly a rotation    project_so, project_se; is_so, is_se, distance_to_so
+sample random rotations                      sample_rotation, sample_quaternion
+join two rotations or poses                  geodesic, screw, projected_line, projected_cubic,
+                                             projected_quintic; closed_forms has more
+join them with the least cost                minimum_acceleration, minimum_torque, minimum_jerk
+state the velocities of poses                twist_from_rates
+state which body moves                       Body(inertia, mass, centre), Body.box(sides, mass)
+pass through many poses                      projected_spline, quaternion_spline; chain, for given
+                                             velocities; joined, for a rotation and a position
+pass through them with the least cost        minimum_acceleration_spline, minimum_torque_spline,
+                                             minimum_jerk_spline
+evaluate a curve c                           c(t), c(t, 1), c(t, 2); c.state(t) for all three
+slow it down, move it                        c.retimed(duration), c.moved(left, right)
+find its cost                                acceleration_cost, torque_cost, jerk_cost
+find out whether an optimum is one           c.certified; excess_estimate, for other curves
+follow a path in the least time              fastest; limits_used for the use of each limit
+read and write paths                         read_path, write_path
+draw                                         draw.profiles, and the module draw
 
-The line "Source" of a docstring cites the equations that the function implements. BK is Belta and
-Kumar (2002), and RR is the report by Samayamantula and Zou. A source such as "beyond BK 12" is an
-entry of docs/ledger.md whose content is in neither text.
+The modules closed_forms, quaternion, metrics, connection, planar, arm, sampling, straight_line,
+optimum, files, textbook (short versions of the main algorithms), report and draw have more.
 
-`BASIS_SO3`, shape (3, 3, 3), and `BASIS_SE3`, shape (6, 4, 4), are the standard bases of the Lie
-algebras. `METRIC_SO3` and `METRIC_SE3` are the matrices of the metrics that the trace induces (BK
-(12), (14)). The dict `CLOSED_FORMS` maps names to the functions that approximate the optimum in
-closed form.
+Conventions: angles are in rad, and lengths in m. Velocities are in the body frame, per unit of
+time: angular velocities ω, shape (3,), of rotations, and twists (ω, v), shape (6,), of poses. The
+shape decides: (..., 3, 3) are rotations, and (..., 4, 4) poses. Lists, and objects that have
+``as_matrix``, such as SciPy's ``Rotation`` and ``RigidTransform``, are accepted in place of arrays.
+Results are NumPy arrays in double precision; there is no automatic differentiation.
 
 An argument that is not finite, has the wrong shape or is outside the stated range raises a
 ValueError that names it. So does a matrix that is not symmetric or positive definite where this is
 required. Batch shapes that do not broadcast also raise ValueError. The docstrings name the other
-errors.
+errors. Rotation matrices, poses and unit quaternions must be valid: a deviation of at most 1e-6, as
+of numbers in single precision, is removed by projection, and a larger one raises a ValueError that
+states it; `project_so`, `project_se` and `quaternion.project_quaternion` return the nearest valid
+arguments.
 
-Rotation matrices, poses and unit quaternions must be valid. A deviation of at most 1e-9 is
-accepted, and one of at most 1e-6, as of numbers in single precision, is removed by projection. A
-larger deviation raises a ValueError that states it; `project_so`, `project_se` and
-`project_quaternion` return the nearest valid arguments. SciPy's ``Rotation`` and ``RigidTransform``
-are accepted in place of matrices. All results are NumPy arrays in double precision.
-Angles are in rad, and lengths in m. Angular velocities and twists (ω, v) are in the body frame, per
-unit of time.
+The line "Source" of a docstring cites the equations that the function implements. BK is Belta and
+Kumar (2002), and RR is the report by Samayamantula and Zou. A source such as "beyond BK 12" is an
+entry of docs/ledger.md whose content is in neither text.
 """
 
-from rbcourse import arm, connection, files, metrics, planar, quaternion, sampling, straight_line
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from rbcourse._migration import RENAMED
 from rbcourse._numerics import Array
-from rbcourse.connection import geodesic_flow
+from rbcourse.body import Body
 from rbcourse.conversions import (
     matrix_from_quaternion,
     matrix_from_zyx,
     quaternion_from_matrix,
-    quaternion_from_rotation_vector,
-    quaternion_from_zyx,
-    rotation_vector_from_quaternion,
     zyx_from_matrix,
-    zyx_from_quaternion,
 )
-from rbcourse.curves.bezier import (
-    bezier_long_so3,
-    bezier_so3,
-    corrected_bezier_so3,
-    cumulative_bezier_so3,
-)
-from rbcourse.curves.chain import (
-    Chain,
-    chain,
-    projected_spline_se3,
-    projected_spline_so3,
-    quaternion_spline_so3,
-)
-from rbcourse.curves.closed import (
-    CLOSED_FORMS,
-    cayley_cubic_so3,
-    exponential_cubic_long_so3,
-    exponential_cubic_so3,
-    exponential_quintic_so3,
-    normal_cubic_so3,
-    quaternion_cubic_so3,
-)
+from rbcourse.curves.chain import chain, joined, projected_spline, quaternion_spline
 from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
-from rbcourse.curves.curve import Curve, Ends, geodesic_so3, retime
-from rbcourse.curves.projected_line import projected_line_so3
-from rbcourse.curves.projected_polynomial import (
-    ProjectedPolynomial,
-    projected_cubic_so3,
-    projected_quintic_so3,
-    weighted_cubic_so3,
-)
-from rbcourse.curves.rigid import (
-    geodesic_se3,
-    minimum_acceleration_se3,
-    projected_cubic_se3,
-    screw_from_pose,
-    screw_se3,
-)
-from rbcourse.curves.timing import Timed, fastest, limits_used
+from rbcourse.curves.curve import Curve
+from rbcourse.curves.geodesics import geodesic, screw, screw_from_pose
+from rbcourse.curves.projected import projected_cubic, projected_quintic
+from rbcourse.curves.projected_line import projected_line
+from rbcourse.curves.timing import Limits, fastest, limits_used
 from rbcourse.curves.velocities import bessel_velocities, spline_velocities
 from rbcourse.files import read_path, write_path
-from rbcourse.metrics import METRIC_SE3, METRIC_SO3
 from rbcourse.optimum import (
-    ConvergenceError,
-    Optimum,
-    minimum_acceleration_so3,
-    minimum_jerk_so3,
-    minimum_torque_so3,
-    stationary_so3,
+    excess_estimate,
+    minimum_acceleration,
+    minimum_acceleration_spline,
+    minimum_jerk,
+    minimum_jerk_spline,
+    minimum_torque,
+    minimum_torque_spline,
 )
-from rbcourse.optimum.excess import excess_estimate
-from rbcourse.optimum.many_poses import (
-    OptimalChain,
-    is_local_minimum,
-    minimum_acceleration_spline_se3,
-    minimum_acceleration_spline_so3,
-    minimum_jerk_spline_so3,
-    minimum_torque_spline_so3,
-)
-from rbcourse.projection import (
-    distance_to_so,
-    is_se,
-    is_so,
-    orthonormalize_gram_schmidt,
-    project_se,
-    project_so,
-    project_so_weighted,
-)
-from rbcourse.quaternion import (
-    continuous_quaternions,
-    is_unit_quaternion,
-    project_quaternion,
-    quaternion_multiply,
-    rotate_by_quaternion,
-    slerp,
-)
+from rbcourse.projection import distance_to_so, is_se, is_so, project_se, project_so
+from rbcourse.quaternion import slerp
 from rbcourse.sampling import sample_quaternion, sample_rotation
 from rbcourse.se3 import (
-    BASIS_SE3,
     adjoint_se3,
     components_from_pose,
     coordinates_from_pose,
@@ -130,10 +91,10 @@ from rbcourse.se3 import (
     log_se3,
     pose_from_components,
     pose_from_coordinates,
+    twist_from_rates,
     vee_se3,
 )
 from rbcourse.so3 import (
-    BASIS_SO3,
     angle_between,
     exp_so3,
     hat_so3,
@@ -143,11 +104,10 @@ from rbcourse.so3 import (
     vee_so3,
 )
 
-__version__ = "2.0.0a1"
+__version__ = "2.0.0a2"
 
 __all__ = [  # noqa: RUF022 - sorted by subject
     # rotations
-    "BASIS_SO3",
     "hat_so3",
     "vee_so3",
     "exp_so3",
@@ -156,20 +116,12 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "right_jacobian_so3",
     "right_jacobian_inverse_so3",
     # other representations of rotations
-    "quaternion_multiply",
-    "rotate_by_quaternion",
-    "slerp",
-    "continuous_quaternions",
     "quaternion_from_matrix",
     "matrix_from_quaternion",
-    "quaternion_from_rotation_vector",
-    "rotation_vector_from_quaternion",
+    "slerp",
     "matrix_from_zyx",
     "zyx_from_matrix",
-    "quaternion_from_zyx",
-    "zyx_from_quaternion",
     # poses
-    "BASIS_SE3",
     "hat_se3",
     "vee_se3",
     "exp_se3",
@@ -180,90 +132,93 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "components_from_pose",
     "pose_from_coordinates",
     "coordinates_from_pose",
+    "twist_from_rates",
     # membership and projection
     "is_so",
     "is_se",
-    "is_unit_quaternion",
     "project_so",
     "project_se",
-    "project_quaternion",
-    "project_so_weighted",
-    "orthonormalize_gram_schmidt",
     "distance_to_so",
     # random rotations
     "sample_rotation",
     "sample_quaternion",
-    # metrics
-    "METRIC_SO3",
-    "METRIC_SE3",
-    "geodesic_flow",
     # curves between two rotations or poses
     "Curve",
-    "Ends",
-    "geodesic_so3",
-    "geodesic_se3",
-    "screw_se3",
+    "Body",
+    "geodesic",
+    "screw",
     "screw_from_pose",
-    "projected_line_so3",
-    "projected_cubic_so3",
-    "projected_cubic_se3",
-    "projected_quintic_so3",
-    "ProjectedPolynomial",
+    "projected_line",
+    "projected_cubic",
+    "projected_quintic",
     # the optimum, and costs of curves
-    "minimum_acceleration_so3",
-    "minimum_acceleration_se3",
-    "minimum_torque_so3",
-    "minimum_jerk_so3",
-    "stationary_so3",
-    "Optimum",
-    "ConvergenceError",
+    "minimum_acceleration",
+    "minimum_torque",
+    "minimum_jerk",
     "acceleration_cost",
-    "excess_estimate",
     "acceleration_cost_parts",
     "torque_cost",
     "jerk_cost",
-    # other closed forms
-    "CLOSED_FORMS",
-    "exponential_cubic_so3",
-    "exponential_cubic_long_so3",
-    "bezier_so3",
-    "bezier_long_so3",
-    "cumulative_bezier_so3",
-    "quaternion_cubic_so3",
-    "cayley_cubic_so3",
-    "corrected_bezier_so3",
-    "exponential_quintic_so3",
-    "normal_cubic_so3",
-    "weighted_cubic_so3",
-    # paths through many poses, and files
-    "retime",
+    "excess_estimate",
+    # curves through many poses, their timing, and files
     "chain",
-    "Chain",
+    "projected_spline",
+    "quaternion_spline",
+    "minimum_acceleration_spline",
+    "minimum_torque_spline",
+    "minimum_jerk_spline",
     "spline_velocities",
     "bessel_velocities",
-    "projected_spline_so3",
-    "projected_spline_se3",
-    "quaternion_spline_so3",
-    "minimum_acceleration_spline_so3",
-    "minimum_acceleration_spline_se3",
-    "minimum_torque_spline_so3",
-    "is_local_minimum",
-    "minimum_jerk_spline_so3",
-    "OptimalChain",
+    "joined",
     "fastest",
     "limits_used",
-    "Timed",
+    "Limits",
     "read_path",
     "write_path",
     # for annotations
     "Array",
-    # modules with further names
-    "arm",
-    "connection",
-    "files",
-    "metrics",
-    "planar",
-    "quaternion",
-    "sampling",
-    "straight_line",
 ]
+
+if TYPE_CHECKING:
+    from rbcourse import arm as arm
+    from rbcourse import closed_forms as closed_forms
+    from rbcourse import connection as connection
+    from rbcourse import draw as draw
+    from rbcourse import files as files
+    from rbcourse import metrics as metrics
+    from rbcourse import optimum as optimum
+    from rbcourse import planar as planar
+    from rbcourse import projection as projection
+    from rbcourse import quaternion as quaternion
+    from rbcourse import report as report
+    from rbcourse import sampling as sampling
+    from rbcourse import straight_line as straight_line
+    from rbcourse import textbook as textbook
+else:
+    _MODULES = {
+        "arm",
+        "closed_forms",
+        "connection",
+        "draw",
+        "files",
+        "metrics",
+        "optimum",
+        "planar",
+        "projection",
+        "quaternion",
+        "report",
+        "sampling",
+        "straight_line",
+        "textbook",
+    }
+
+    def __getattr__(name: str) -> Any:
+        """Import a module when it is first used; name the replacement of a name of version 1."""
+        if name in _MODULES:
+            return import_module(f"rbcourse.{name}")
+        if name in RENAMED:
+            raise AttributeError(f"rbcourse.{name} is gone in version 2.0; use {RENAMED[name]}")
+        raise AttributeError(f"module 'rbcourse' has no attribute {name!r}")
+
+    def __dir__() -> list[str]:
+        return sorted({*globals(), *_MODULES})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -45,7 +45,7 @@ def chebyshev(t: Array, count: int) -> Array:
     """Return the first `count` Chebyshev polynomials on [0, 1] at the times t."""
     from numpy.polynomial.chebyshev import chebvander
 
-    return chebvander(2 * t - 1, count - 1)
+    return cast(Array, chebvander(2 * t - 1, count - 1))
 
 
 @lru_cache
@@ -75,7 +75,7 @@ def primitives(n: int, m: int) -> Primitives:
 
     nodes, few, each = grid(n), grid(m), list(np.eye(m)[:, None])
     polynomial = [_product(few.series, hermite(each, few.t[:, None], i)) for i in range(m)]
-    integral = [chebint(nodes.series, m - i, lbnd=-1, scl=0.5) for i in range(m)]
+    integral = [cast(Array, chebint(nodes.series, m - i, lbnd=-1, scl=0.5)) for i in range(m)]
     ends = np.concatenate(
         [_product(chebyshev(few.t[[0, -1]], len(c)), c) for c in integral[: m // 2]]
     )

@@ -3,12 +3,12 @@
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.floating[Any]]
+Array: TypeAlias = NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
 BLOCK = 5000  # matrices that are computed together, which bounds the memory for workspaces
 Item = TypeVar("Item")

@@ -17,7 +17,14 @@ from rbcourse.projection import project_se, project_so
 from rbcourse.se3 import BASIS_SE3
 from rbcourse.so3 import BASIS_SO3
 
-__all__ = ["christoffel", "covariant_derivative", "geodesic_flow", "structure_constants"]
+__all__ = [
+    "BASIS_SE3",
+    "BASIS_SO3",
+    "christoffel",
+    "covariant_derivative",
+    "geodesic_flow",
+    "structure_constants",
+]
 
 
 def structure_constants(basis: ArrayLike) -> Array:
@@ -167,8 +174,8 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     raised.
     An eighth-order Runge–Kutta method with a relative tolerance of 3e-14 solves A' = A hat(v), v'_i
     = −Γ_ijk v_j v_k. On SO(3), these are Euler's equations. The N members of a batch share the
-    tolerance, so the error of a single member may be up to √N times larger. `screw_se3` gives
-    geodesics of the metric (10) in closed form. `geodesic_so3` and `geodesic_se3` give geodesics of
+    tolerance, so the error of a single member may be up to √N times larger. `screw` gives
+    geodesics of the metric (10) in closed form. `geodesic` gives geodesics of
     (12) and (14) in closed form.
 
     Examples

@@ -80,8 +80,8 @@ def write_path(
     Examples
     --------
     >>> import tempfile
-    >>> from rbcourse import geodesic_se3, pose_from_coordinates
-    >>> c = geodesic_se3(np.eye(4), pose_from_coordinates([0, 0, 3, 2, 0, 0]))
+    >>> from rbcourse import geodesic, pose_from_coordinates
+    >>> c = geodesic(np.eye(4), pose_from_coordinates([0, 0, 3, 2, 0, 0]))
     >>> t = [0, 0.5, 1]
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_path(f"{folder}/path.csv", t, c(t), c(t, 1))

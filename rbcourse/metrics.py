@@ -13,19 +13,17 @@ from rbcourse._checks import (
     as_finite,
     as_positive,
     as_symmetric,
-    check_all,
     check_broadcast,
-    first_index,
 )
-from rbcourse._numerics import EPS, Array, matvec, scaled
+from rbcourse._numerics import Array, matvec
 from rbcourse._valid import as_rotations_or_poses
+from rbcourse.body import weight_of
 from rbcourse.se3 import hat_se3
 from rbcourse.so3 import hat_so3, vee
 
 __all__ = [
     "METRIC_SE3",
     "METRIC_SO3",
-    "box_inertia",
     "components_from_tangent",
     "inertia_from_weight",
     "inner_ga",
@@ -191,7 +189,8 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     0.0
     """
     alpha, beta = as_positive("alpha", alpha), as_positive("beta", beta)
-    return np.kron([[alpha, beta], [beta, 0.0]], np.eye(3))
+    metric: Array = np.kron(np.array([[alpha, beta], [beta, 0.0]]), np.eye(3))
+    return metric
 
 
 def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
@@ -248,35 +247,6 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     return _components(A, X)
 
 
-def box_inertia(sides: ArrayLike, mass: float = 1.0) -> Array:
-    """Return the inertia of a solid box about its centre: diag(b² + c², c² + a², a² + b²) m/12.
-
-    Parameters
-    ----------
-    sides : array_like, shape (..., 3)
-        The lengths a, b, c along the axes, at least 0.
-    mass : float, optional
-        The mass in kg, above 0.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        The inertia in body axes, in kg m².
-
-    Examples
-    --------
-    >>> box_inertia([1, 2, 3], 12)
-    array([[13.,  0.,  0.],
-           [ 0., 10.,  0.],
-           [ 0.,  0.,  5.]])
-    """
-    sides, mass = as_finite("sides", sides, 3), as_positive("mass", mass)
-    check_all(sides >= 0, "sides", sides, "a length from 0 up")
-    squares = sides**2
-    moments = squares[..., [1, 2, 0]] + squares[..., [2, 0, 1]]
-    return mass / 12 * moments[..., None] * np.eye(3)
-
-
 def inertia_from_weight(W: ArrayLike) -> Array:
     """Return tr(W) I − W, the matrix of the metric that tr(XᵀY W) induces on SO(3).
 
@@ -329,20 +299,6 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     array([2., 1., 0.])
     """
     return weight_of("G", as_symmetric("G", G, 3))
-
-
-def weight_of(name: str, G: Array) -> Array:
-    """Compute `weight_from_inertia` for symmetric matrices; error messages begin with `name`."""
-    moments = np.linalg.eigvalsh(scaled(G))
-    slack = moments[..., 0] + moments[..., 1] - moments[..., 2]
-    refused = slack < -16 * EPS * np.abs(moments).max(axis=-1)
-    if refused.any():
-        least, middle, largest = np.linalg.eigvalsh(G[refused][0])
-        raise ValueError(
-            f"{first_index(name, refused)} has the principal moments {least:.6g}, {middle:.6g}, "
-            f"{largest:.6g}; each must be at most the sum of the other two"
-        )
-    return _trace_times_identity(G / 2) - G
 
 
 def _components(A: Array, X: Array) -> Array:

@@ -18,6 +18,16 @@ from rbcourse._checks import (
 from rbcourse._foam import nearest_rotations
 from rbcourse._numerics import EPS, Array, scaled
 
+__all__ = [
+    "distance_to_so",
+    "is_se",
+    "is_so",
+    "orthonormalize_gram_schmidt",
+    "project_se",
+    "project_so",
+    "project_so_weighted",
+]
+
 MANY = 20  # for this many matrices or more, FOAM is faster than the SVD
 NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see margin)"
 
@@ -256,7 +266,7 @@ def gap(M: Array) -> Array:
 
 
 def _signed_singular_values(M: Array) -> Array:
-    d = np.linalg.svd(M, compute_uv=False)
+    d: Array = np.linalg.svd(M, compute_uv=False).astype(np.float64, copy=False)
     d[..., -1] *= np.linalg.slogdet(M).sign
     return d
 

@@ -19,6 +19,12 @@ from rbcourse._quaternions import canonical
 from rbcourse._taylor import multiply
 from rbcourse._taylor import slerp as slerp_jet
 from rbcourse._valid import as_unit_quaternions
+from rbcourse.conversions import (
+    quaternion_from_rotation_vector,
+    quaternion_from_zyx,
+    rotation_vector_from_quaternion,
+    zyx_from_quaternion,
+)
 
 __all__ = [
     "canonical_quaternion",
@@ -26,10 +32,14 @@ __all__ = [
     "is_unit_quaternion",
     "project_quaternion",
     "quaternion_conjugate",
+    "quaternion_from_rotation_vector",
+    "quaternion_from_zyx",
     "quaternion_multiply",
     "rotate_by_quaternion",
+    "rotation_vector_from_quaternion",
     "slerp",
     "slerp_long",
+    "zyx_from_quaternion",
 ]
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])

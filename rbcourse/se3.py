@@ -294,6 +294,37 @@ def adjoint_se3(A: ArrayLike) -> Array:
     return Ad
 
 
+def twist_from_rates(A: ArrayLike, w: ArrayLike, d_dot: ArrayLike) -> Array:
+    """Return the twist (ω, v) of a body from ω in the body frame and ḋ in the fixed frame.
+
+    Source: BK 6.3, which states end velocities by ω and ḋ.
+
+    Parameters
+    ----------
+    A : array_like, shape (..., 4, 4)
+        The poses of the body.
+    w : array_like, shape (..., 3)
+        Angular velocities in the body frame.
+    d_dot : array_like, shape (..., 3)
+        Velocities of the origin in the fixed frame.
+
+    Returns
+    -------
+    ndarray, shape (..., 6)
+        The twists (ω, Rᵀ ḋ).
+
+    Examples
+    --------
+    >>> A = pose_from_coordinates([0, 0, np.pi / 2, 5, 0, 0])  # turned to the left
+    >>> twist_from_rates(A, [0, 0, 1], [0, 2, 0]).round(12)  # it moves ahead
+    array([0., 0., 1., 2., 0., 0.])
+    """
+    A, w, d_dot = as_poses("A", A), as_finite("w", w, 3), as_finite("d_dot", d_dot, 3)
+    batch = check_broadcast(A=(A, 2), w=(w, 1), d_dot=(d_dot, 1))
+    v = np.broadcast_to(matvec(A[..., :3, :3].mT, d_dot), (*batch, 3))
+    return np.concatenate([np.broadcast_to(w, (*batch, 3)), v], axis=-1)
+
+
 def check_path(
     times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> tuple[Array, Array, Array | None]:

@@ -12,22 +12,24 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rbcourse._numerics import Array
-from rbcourse.curves.bezier import corrected_bezier_so3
+from rbcourse.curves.bezier import corrected_bezier
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
+
+Array = NDArray[Any]
 
 __all__ = [
     "cubic_coefficients",
     "fastest",
-    "geodesic_so3",
-    "minimum_acceleration_so3",
-    "minimum_acceleration_spline_so3",
-    "minimum_torque_so3",
+    "geodesic",
+    "minimum_acceleration",
+    "minimum_acceleration_spline",
+    "minimum_torque",
     "polynomial",
     "project_so",
-    "projected_cubic_so3",
+    "projected_cubic",
     "sample_quaternion",
     "sample_rotation",
     "shoot",
@@ -69,14 +71,14 @@ def project_so(M: Array) -> Array:
     return U @ Vt
 
 
-def geodesic_so3(R0: Array, R1: Array, t: Array) -> Array:
+def geodesic(R0: Array, R1: Array, t: Array) -> Array:
     """Return R0 exp(σ̂ t) at the times t, with σ = log(R0ᵀ R1).
 
     Source: BK 6.1.
 
     Examples
     --------
-    >>> R = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]), np.array([0, 0.5, 1]))
+    >>> R = geodesic(np.eye(3), exp_so3([0, 0, 1.5]), np.array([0, 0.5, 1]))
     >>> log_so3(R)[:, 2].round(12)
     array([0.  , 0.75, 1.5 ])
     """
@@ -84,7 +86,7 @@ def geodesic_so3(R0: Array, R1: Array, t: Array) -> Array:
     return R0 @ exp_so3(t[:, None] * sigma)
 
 
-def projected_cubic_so3(
+def projected_cubic(
     R0: Array, R1: Array, w0: Array, w1: Array, t: Array
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the projected cubic at the times t.
@@ -96,7 +98,7 @@ def projected_cubic_so3(
     Examples
     --------
     >>> R1, rest, t = exp_so3([0, 0, 1.5]), np.zeros(3), np.array([0, 0.5, 1])
-    >>> log_so3(projected_cubic_so3(np.eye(3), R1, rest, rest, t)[0])[:, 2].round(12)
+    >>> log_so3(projected_cubic(np.eye(3), R1, rest, rest, t)[0])[:, 2].round(12)
     array([0.  , 0.75, 1.5 ])
     """
     coefficients = cubic_coefficients(R0, R1, R0 @ hat_so3(w0), R1 @ hat_so3(w1))
@@ -148,7 +150,7 @@ def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
     return value[()]
 
 
-def minimum_torque_so3(
+def minimum_torque(
     R0: Array, R1: Array, w0: Array, w1: Array, G: Array, t: Array, tol: float = 1e-9
 ) -> tuple[Array, Array]:
     """Return R and w of the least-torque motion at the times t, by SciPy's `solve_bvp`.
@@ -162,7 +164,7 @@ def minimum_torque_so3(
     Examples
     --------
     >>> R1, rest, G = exp_so3([0, 0, 1.5]), np.zeros(3), np.diag([1.0, 2, 2.5])
-    >>> R, w = minimum_torque_so3(np.eye(3), R1, rest, rest, G, np.array([0.5]))
+    >>> R, w = minimum_torque(np.eye(3), R1, rest, rest, G, np.array([0.5]))
     >>> log_so3(R)[:, 2].round(9) + 0.0
     array([0.75])
     """
@@ -225,7 +227,7 @@ def sample_quaternion(n: int, rng: np.random.Generator) -> Array:
     return shoemake_quaternion(rng.random((n, 3)))
 
 
-def minimum_acceleration_so3(
+def minimum_acceleration(
     R0: Array, R1: Array, w0: Array, w1: Array, t: Array, tol: float = 1e-9
 ) -> tuple[Array, Array, Array]:
     """Return R, w and w' of the optimum at the times t, by SciPy's `solve_bvp`.
@@ -237,7 +239,7 @@ def minimum_acceleration_so3(
     Examples
     --------
     >>> R1, rest, t = exp_so3([0, 0, 1.5]), np.zeros(3), np.array([0, 0.5, 1])
-    >>> R, w, a = minimum_acceleration_so3(np.eye(3), R1, rest, rest, t)
+    >>> R, w, a = minimum_acceleration(np.eye(3), R1, rest, rest, t)
     >>> log_so3(R)[:, 2].round(9) + 0.0
     array([0.  , 0.75, 1.5 ])
     """
@@ -268,7 +270,7 @@ def shoot(R0: Array, R1: Array, w0: Array, w1: Array, t: Array) -> tuple[Array, 
 
     Equation (20), w'' + w × w' = b, is integrated from t = 0. Newton's method corrects the six
     unknowns w'(0) and b until R(1) and w(1) are right to 1e-10. The first values are those of
-    `corrected_bezier_so3`, with the mean of R w'', which is constant along an optimum. The method
+    `corrected_bezier`, with the mean of R w'', which is constant along an optimum. The method
     may find a stationary curve that is not the cheapest.
 
     If ‖w0‖ or ‖w1‖ is 3π or more, where the method seldom converges, a ValueError is raised. If 20
@@ -299,7 +301,7 @@ def shoot(R0: Array, R1: Array, w0: Array, w1: Array, t: Array) -> tuple[Array, 
         R, w, a = np.split(moved.y.T.reshape(-1, K, 15), [9, 12], axis=2)
         return R.reshape(-1, K, 3, 3), w, a
 
-    guess, inside = corrected_bezier_so3(R0, R1, w0, w1), np.linspace(0.1, 0.9, 9)
+    guess, inside = corrected_bezier(R0, R1, w0, w1), np.linspace(0.1, 0.9, 9)
     constant = np.mean(guess(inside) @ guess(inside, 3)[..., None], axis=0)[:, 0]
     aim = np.append(guess(0, 2), R0.T @ constant + np.cross(w0, guess(0, 2)))
     for corrections in range(21):
@@ -342,19 +344,19 @@ def spline_velocities(times: Array, R: Array) -> Array:
     return np.linalg.solve(H.reshape(b.size, b.size), b.ravel()).reshape(b.shape)
 
 
-def minimum_acceleration_spline_so3(
+def minimum_acceleration_spline(
     times: Array, R: Array, ends: tuple[Array, Array] | None = None, tol: float = 1e-10
 ) -> tuple[Array, Array]:
     """Return w and w' of the optimum through the rotations R, by SciPy's `solve_bvp`.
 
     All legs are solved together; the time of each leg runs from 0 to 1. The equations are those of
-    `minimum_acceleration_so3`. At the inner rotations, w and w' are continuous. At both ends, w is
+    `minimum_acceleration`. At the inner rotations, w and w' are continuous. At both ends, w is
     given, or w' = 0. If the solver fails, a RuntimeError names the reason.
     Source: beyond BK 12.
 
     Examples
     --------
-    >>> w, a = minimum_acceleration_spline_so3(np.array([0.0, 2]), exp_so3([[0, 0, 0], [0, 0, 1]]))
+    >>> w, a = minimum_acceleration_spline(np.array([0.0, 2]), exp_so3([[0, 0, 0], [0, 0, 1]]))
     >>> w.round(9) + 0.0
     array([[0. , 0. , 0.5],
            [0. , 0. , 0.5]])

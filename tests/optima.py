@@ -12,18 +12,20 @@ PAPER = {  # the rotation vector and the velocities of the paper's figures
     "4c": (ALONG, ALONG, ALONG + 5 * I3[0]),
     "5": (np.pi / 6 * np.array([1, 4, 3]), np.array([1.0, 2, 3]), np.array([2.0, 1, 1])),
 }
-BOOK = rb.metrics.box_inertia([0.3, 0.2, 0.03])
+BOOK = rb.Body.box([0.3, 0.2, 0.03]).inertia
 """The inertia of a book of 1 kg, 30 cm by 20 cm by 3 cm."""
 OPTIMA = {
-    "ball": lambda R0, R1, w0, w1, *_: rb.minimum_acceleration_so3(R0, R1, w0, w1),
-    "acceleration": lambda R0, R1, w0, w1, G, *_: rb.minimum_acceleration_so3(R0, R1, w0, w1, G),
-    "torque": lambda R0, R1, w0, w1, G, *_: rb.minimum_torque_so3(R0, R1, w0, w1, G),
-    "jerk": lambda R0, R1, w0, w1, _, a0, a1: rb.minimum_jerk_so3(R0, R1, w0, w1, a0, a1),
+    "ball": lambda R0, R1, w0, w1, *_: rb.minimum_acceleration(R0, R1, w0, w1),
+    "acceleration": lambda R0, R1, w0, w1, G, *_: rb.minimum_acceleration(
+        R0, R1, w0, w1, body=rb.Body(G)
+    ),
+    "torque": lambda R0, R1, w0, w1, G, *_: rb.minimum_torque(R0, R1, w0, w1, body=rb.Body(G)),
+    "jerk": lambda R0, R1, w0, w1, _, a0, a1: rb.minimum_jerk(R0, R1, w0, w1, a0, a1),
 }
 COSTS = {
     "ball": lambda curve, _: rb.acceleration_cost(curve),
-    "acceleration": lambda curve, G: rb.acceleration_cost(curve, G),
-    "torque": lambda curve, G: rb.torque_cost(curve, G),
+    "acceleration": lambda curve, G: rb.acceleration_cost(curve, body=rb.Body(G)),
+    "torque": lambda curve, G: rb.torque_cost(curve, body=rb.Body(G)),
     "jerk": lambda curve, _: rb.jerk_cost(curve),
 }
 

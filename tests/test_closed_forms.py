@@ -17,11 +17,11 @@ from rbcourse._hermite import hermite
 
 EPS = np.finfo(float).eps
 MAKERS = {
-    "exponential": rb.exponential_cubic_so3,
-    "bezier": rb.bezier_so3,
-    "cumulative": rb.cumulative_bezier_so3,
-    "quaternion": rb.quaternion_cubic_so3,
-    "cayley": rb.cayley_cubic_so3,
+    "exponential": rb.closed_forms.exponential_cubic,
+    "bezier": rb.closed_forms.bezier,
+    "cumulative": rb.closed_forms.cumulative_bezier,
+    "quaternion": rb.closed_forms.quaternion_cubic,
+    "cayley": rb.closed_forms.cayley_cubic,
 }
 I3, REST = np.eye(3), np.zeros(3)
 every_curve = pytest.mark.parametrize("name", MAKERS)
@@ -229,29 +229,33 @@ def test_errors_name_the_ends_that_are_outside_the_domain():
     w[1, 2] = 3 * np.pi * np.array([2, 1, 2]) / 3
     for name, given in (("w0", (w, REST)), ("w1", (REST, w))):
         with pytest.raises(ValueError, match=rf"^{name}\[1, 2\]: a norm below 3π is wanted"):
-            rb.bezier_so3(I3, I3, *given)
+            rb.closed_forms.bezier(I3, I3, *given)
     below = w * (1 - 1e-12)
-    curve = rb.bezier_so3(I3, I3, below, below)
+    curve = rb.closed_forms.bezier(I3, I3, below, below)
     assert np.abs(curve([0, 1], 1) - below).max() < 100 * EPS
     with pytest.raises(ValueError, match=r"^R0 and R1 of curve \[1\] are a half-turn apart"):
-        rb.cayley_cubic_so3(I3, np.stack([I3, half]), REST, REST)
+        rb.closed_forms.cayley_cubic(I3, np.stack([I3, half]), REST, REST)
     rounded = awkward.rounded_half_turns(np.random.default_rng(12), 100)[:2]
     for R0, R1 in (*((I3, R) for R in awkward.half_turns()[0]), *zip(*rounded, strict=True)):
         with pytest.raises(ValueError, match=r"^R0 and R1 are a half-turn apart"):
-            rb.cayley_cubic_so3(R0, R1, REST, REST)
+            rb.closed_forms.cayley_cubic(R0, R1, REST, REST)
     bodies = np.stack([I3, np.diag([1.0, 1, 3])])
     with pytest.raises(ValueError, match=r"^inertia\[1\] has the principal moments 1, 1, 3; each"):
         rb.weighted_cubic_so3(I3, I3, REST, REST, bodies)
-    rb.normal_cubic_so3(I3, I3, REST, REST, bodies)
+    rb.closed_forms.normal_cubic(I3, I3, REST, REST, bodies)
 
 
-@pytest.mark.parametrize("make", [*MAKERS.values(), rb.corrected_bezier_so3])
+@pytest.mark.parametrize("make", [*MAKERS.values(), rb.closed_forms.corrected_bezier])
 def test_three_closed_forms_are_reversible_in_time(make):
     """For some fast ends, the correction uses a logarithm that is not the shortest one."""
     R0, R1, w0, w1 = ends(40, 2.5)
     curve, back = make(R0, R1, w0, w1), make(R1, R0, -w1, -w0)
     t = np.linspace(0, 1, 11)
-    if make not in (rb.bezier_so3, rb.corrected_bezier_so3, rb.quaternion_cubic_so3):
+    if make not in (
+        rb.closed_forms.bezier,
+        rb.closed_forms.corrected_bezier,
+        rb.closed_forms.quaternion_cubic,
+    ):
         assert np.all(np.abs(curve(t) - back(1 - t)).max(axis=(0, 2, 3)) > 1e-3)
         return
     worse = 1 / np.minimum(getattr(curve, "margin", np.ones(40)), 1)
@@ -273,7 +277,7 @@ def cubic_of_quaternions(R0, R1, w0, w1, t):
 
 def test_the_margin_is_the_least_norm_of_the_cubic():
     given = ends(200, size=20)
-    curve = rb.quaternion_cubic_so3(*given)
+    curve = rb.closed_forms.quaternion_cubic(*given)
     norms = np.linalg.norm(cubic_of_quaternions(*given, np.linspace(0, 1, 1001)), axis=1)
     assert curve.margin.shape == curve.margin_time.shape == (200,)
     assert curve.margin.min() < 0.3
@@ -298,7 +302,10 @@ def in_a_plane(margin):
 def test_errors_grow_with_the_inverse_norm_of_the_cubic(margin):
     turn, w0, w1 = in_a_plane(margin)
     given = I3, oracles.exp_so3(turn), w0, w1
-    curve, t = rb.quaternion_cubic_so3(*given), 0.5 + np.array([-0.25, -margin / 8, 0, margin / 32])
+    curve, t = (
+        rb.closed_forms.quaternion_cubic(*given),
+        0.5 + np.array([-0.25, -margin / 8, 0, margin / 32]),
+    )
     assert abs(curve.margin - margin) < 20 * EPS
     assert abs(curve.margin_time - 0.5) < 1e-7
     [Q] = cubic_of_quaternions(*(x[None] for x in given), t)
@@ -309,7 +316,7 @@ def test_errors_grow_with_the_inverse_norm_of_the_cubic(margin):
 
 def test_a_zero_of_the_quaternion_cubic_is_refused():
     turn, w0, w1 = in_a_plane(0)
-    stack = rb.quaternion_cubic_so3(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
+    stack = rb.closed_forms.quaternion_cubic(I3, oracles.exp_so3(turn), np.stack([0 * w0, w0]), w1)
     assert stack.margin[1] < 20 * EPS
     assert abs(stack.margin_time[1] - 0.5) < 1e-12
     for order in (0, 1, 2):
@@ -331,10 +338,10 @@ TIMES = np.linspace(0, 1, 51)
 def test_the_weighted_cubic_gives_the_nearest_rotation_in_its_metric():
     curves = rb.weighted_cubic_so3(R0, R1, W0, W1, BOOK)
     M = hermite([R0, R1, R0 @ rb.hat_so3(W0), R1 @ rb.hat_so3(W1)], TIMES[:, None, None, None])
-    nearest = rb.project_so_weighted(M, rb.metrics.weight_from_inertia(BOOK))
+    nearest = rb.projection.project_so_weighted(M, rb.metrics.weight_from_inertia(BOOK))
     assert np.abs(curves(TIMES) - nearest).max() < 1e-13
     round_one = rb.weighted_cubic_so3(R0, R1, W0, W1, 5 * I3)
-    same = rb.projected_cubic_so3(R0, R1, W0, W1)
+    same = rb.projected_cubic(R0, R1, W0, W1)
     assert np.abs(round_one(TIMES) - same(TIMES)).max() < 1e-14
     assert round_one.margin == pytest.approx(same.margin, rel=1e-12)
     flat = rb.weighted_cubic_so3(R0, R1, W0, W1, np.diag([1.0, 2, 3]))
@@ -344,7 +351,7 @@ def test_the_weighted_cubic_gives_the_nearest_rotation_in_its_metric():
 @pytest.mark.source("beyond BK 7")
 def test_the_normal_cubic_satisfies_its_formula():
     """SciPy solves the formula for x(t), which must be a cubic."""
-    curve = rb.normal_cubic_so3(R0[0], R1[0], W0[0], W1[0], BOOK)
+    curve = rb.closed_forms.normal_cubic(R0[0], R1[0], W0[0], W1[0], BOOK)
     t, inverse = np.linspace(0, 1, 9), np.linalg.inv(BOOK)
 
     def x(y):
@@ -352,8 +359,8 @@ def test_the_normal_cubic_satisfies_its_formula():
 
     for one in np.transpose([x(y) for y in rb.log_so3(R0[0].T @ curve(t))]):
         assert np.abs(Polynomial.fit(t, one, 3)(t) - one).max() < 1e-12
-    round_one = rb.normal_cubic_so3(R0, R1, W0, W1, 3 * I3)
-    same = rb.exponential_cubic_so3(R0, R1, W0, W1)
+    round_one = rb.closed_forms.normal_cubic(R0, R1, W0, W1, 3 * I3)
+    same = rb.closed_forms.exponential_cubic(R0, R1, W0, W1)
     assert np.abs(round_one(TIMES) - same(TIMES)).max() < 1e-13
 
 
@@ -361,18 +368,18 @@ def test_the_normal_cubic_of_thin_bodies_exists_except_at_the_singular_angle():
     """For turns about a plate's middle axis, the map from x to y is singular at about 2.02 rad."""
     for moments in ((1e-6, 1, 1), (1, 1, 1e-6), (1e-3, 1, 1)):
         R1 = rb.exp_so3([0.4, 0.1, 0.3])
-        curve = rb.normal_cubic_so3(I3, R1, REST, REST, np.diag(moments))
+        curve = rb.closed_forms.normal_cubic(I3, R1, REST, REST, np.diag(moments))
         assert np.abs(curve(1) - R1).max() < 1e-9
     plate = np.diag([0.01, 1.0, 1.01])
     for angle in (2.0, 2.03, 2.5, 3.1):
-        curve = rb.normal_cubic_so3(I3, rb.exp_so3([0, angle, 0]), REST, REST, plate)
+        curve = rb.closed_forms.normal_cubic(I3, rb.exp_so3([0, angle, 0]), REST, REST, plate)
         turn = angle * np.outer(3 * TIMES**2 - 2 * TIMES**3, [0, 1, 0])
         assert np.abs(curve(TIMES) - rb.exp_so3(turn)).max() < 1e-12
     singular = 1 / np.sqrt((1.01 - 1) / (2 * 0.01) * (1 - 0.01) / (2 * 1.01))
     turns = rb.exp_so3([[0, 0.1, 0], [0, singular, 0]])
     for given, curve in ((turns[1], ""), (turns, r" of curve \[1\]")):
         with pytest.raises(ValueError, match=rf"^normal cubic{curve}: the map from x to y is sing"):
-            rb.normal_cubic_so3(I3, given, REST, REST, plate)
+            rb.closed_forms.normal_cubic(I3, given, REST, REST, plate)
 
 
 @pytest.mark.source("beyond BK 8")
@@ -380,11 +387,13 @@ def test_the_excess_of_the_quintic_grows_as_the_fourth_power():
     found = []
     for s in (0.2, 0.1, 1):
         ends = I3, rb.exp_so3(s * TURN), *(s * x for x in (W0, W1, A0, A1))
-        excess = rb.jerk_cost(rb.exponential_quintic_so3(*ends)) / rb.minimum_jerk_so3(*ends).cost
+        excess = (
+            rb.jerk_cost(rb.closed_forms.exponential_quintic(*ends)) / rb.minimum_jerk(*ends).cost
+        )
         found.append(np.median(excess - 1))
     assert np.log2(found[0] / found[1]) == pytest.approx(4, abs=0.25)
     assert found[2] < 0.05
-    rest = rb.exponential_quintic_so3(R0, R1, REST, REST, REST, REST)
+    rest = rb.closed_forms.exponential_quintic(R0, R1, REST, REST, REST, REST)
     assert rb.jerk_cost(rest) == pytest.approx(1440 * np.sum(TURN**2, axis=-1), rel=1e-10)
 
 
@@ -395,12 +404,12 @@ def test_the_quaternion_cubic_turns_the_short_way_if_both_ends_are_below_8_rad()
     speed = np.maximum(np.linalg.norm(w0, axis=1), np.linalg.norm(w1, axis=1))
     a = rb.angle_between(R0, R1)
     bound = np.cos(a / 4) - speed / 8 * np.sin(a / 4)
-    assert np.all(rb.quaternion_cubic_so3(R0, R1, w0, w1).margin >= bound - 8 * EPS)
+    assert np.all(rb.closed_forms.quaternion_cubic(R0, R1, w0, w1).margin >= bound - 8 * EPS)
     assert bound.min() < 0.1
     t, goal = np.linspace(0, 1, 2001), rb.exp_so3([0, 0, np.radians(170)])
 
     def turn(k0, k1):  # about z, in degrees
-        w = rb.quaternion_cubic_so3(I3, goal, [0, 0, k0], [0, 0, k1])(t, 1)[:, 2]
+        w = rb.closed_forms.quaternion_cubic(I3, goal, [0, 0, k0], [0, 0, k1])(t, 1)[:, 2]
         return np.degrees(np.trapezoid(w, t))
 
     for k0 in (-7.99, 0, 7.99):
@@ -410,4 +419,4 @@ def test_the_quaternion_cubic_turns_the_short_way_if_both_ends_are_below_8_rad()
     turning_point = -8 / np.tan(np.radians(170 / 4))  # the cubic meets 0 at t = ½
     for k, degrees in ((0.99 * turning_point, 170), (1.01 * turning_point, -550)):
         assert turn(k, k) == pytest.approx(degrees, abs=2)
-    assert rb.quaternion_cubic_so3(I3, goal, *[[0, 0, turning_point]] * 2).margin < 1e-12
+    assert rb.closed_forms.quaternion_cubic(I3, goal, *[[0, 0, turning_point]] * 2).margin < 1e-12

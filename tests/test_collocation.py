@@ -16,7 +16,7 @@ def test_one_singular_problem_does_not_affect_the_rest_of_a_stack(of_torque, sta
     rng = np.random.default_rng(47)
     R0, R1 = rb.sample_rotation((2, 4), rng=rng)
     rates = rng.normal(size=(4, 2, 3))
-    R = rb.bezier_so3(R0, R1, *rates.swapaxes(0, 1))(grid(17).t).swapaxes(0, 1)
+    R = rb.closed_forms.bezier(R0, R1, *rates.swapaxes(0, 1))(grid(17).t).swapaxes(0, 1)
     solve, equations = collocation.relax_ball, collocation.BallStationary(R0, R1, rates)
     if of_torque:
         functional = Effort(np.stack([np.diag([1.0, 2, 2.5])] * 4), of_torque=True)

@@ -33,7 +33,7 @@ def uneven(c, t, order):
 
 def timed(R0, R1):
     c = np.trace(np.swapaxes(R0, -1, -2) @ R1, axis1=-2, axis2=-1)
-    return rb.projected_line_so3(R0, R1, partial(uneven, c))
+    return rb.projected_line(R0, R1, partial(uneven, c))
 
 
 def returns_a_curve(function):
@@ -41,7 +41,7 @@ def returns_a_curve(function):
     return inspect.isclass(kind) and issubclass(kind, rb.Curve)
 
 
-FUNCTIONS = rb.CLOSED_FORMS | {
+FUNCTIONS = rb.closed_forms.FORMS | {
     name: function
     for name in rb.__all__
     if inspect.isfunction(function := getattr(rb, name)) and returns_a_curve(function)
@@ -51,17 +51,17 @@ NO_STACKS = {  # tested in test_paths.py, test_splines.py and test_timing.py
     for name, function in FUNCTIONS.items()
     if issubclass(typing.get_type_hints(function)["return"], rb.Chain | rb.Timed)
 }
-bezier, cubic = rb.bezier_so3, rb.projected_cubic_so3
+bezier, cubic = rb.closed_forms.bezier, rb.projected_cubic
 MAKERS = {
     **{name: of(function) for name, function in FUNCTIONS.items() if name not in NO_STACKS},
-    "retime": of(lambda R0, R1: rb.retime(rb.geodesic_so3(R0, R1), 2.5)),
-    "stationary_so3": of(lambda R0, R1, w0, w1: rb.stationary_so3(bezier(R0, R1, w0, w1))),
-    "minimum_acceleration_so3 of a body": of(rb.minimum_acceleration_so3, "inertia"),
-    "minimum_acceleration_se3 of a body": of(rb.minimum_acceleration_se3, "inertia"),
-    "minimum_acceleration_se3 off centre": of(
-        partial(rb.minimum_acceleration_se3, centre=[0.1, -0.2, 0.3])
+    "retime": of(lambda R0, R1: rb.retime(rb.geodesic(R0, R1), 2.5)),
+    "stationary_so3": of(lambda R0, R1, w0, w1: rb.optimum.stationary(bezier(R0, R1, w0, w1))),
+    "minimum_acceleration of a body": of(rb.minimum_acceleration, "inertia"),
+    "minimum_acceleration of a body": of(rb.minimum_acceleration, "inertia"),
+    "minimum_acceleration off centre": of(
+        partial(rb.minimum_acceleration, centre=[0.1, -0.2, 0.3])
     ),
-    "projected_line_so3 with f": of(timed),
+    "projected_line with f": of(timed),
     "retime of a projection": of(lambda R0, R1, w0, w1: rb.retime(cubic(R0, R1, w0, w1), 0.5)),
 }
 CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # each order has its core shape
@@ -303,7 +303,7 @@ def lasts_as_long_as_it_is_told(make):
     assert curve.domain == (0, 0.5)
     t = np.random.default_rng(94).random((4, 3))
     powers = np.repeat(range(len(CORES[curve.size])), [*map(math.prod, CORES[curve.size])])
-    for same in (curve, rb.retime(unit, T)):
+    for same in (curve, unit.retimed(T)):
         want = jet(unit, t, own=True) / T[:, None] ** powers
         assert off(jet(same, t * T, own=True), want) < 1e-11
     assert off(curve[2](1.5 * t[:, 2]), curve.at_own_times(t * T)[:, 2]) < 1e-12

@@ -12,7 +12,9 @@ RNG = np.random.default_rng(2026)
 
 
 def test_rotation_matrices_agree_with_scipy():
-    q = np.concatenate([rb.project_quaternion(RNG.normal(size=(200, 4))), awkward.quaternions()])
+    q = np.concatenate(
+        [rb.quaternion.project_quaternion(RNG.normal(size=(200, 4))), awkward.quaternions()]
+    )
     R = rb.matrix_from_quaternion(q)
     assert np.abs(R - Rotation.from_quat(q, scalar_first=True).as_matrix()).max() < 4 * EPS
     assert np.array_equal(rb.matrix_from_quaternion(-q), R)
@@ -31,8 +33,8 @@ def test_exact_and_rounded_half_turns_have_the_documented_sign():
         assert np.all(np.take_along_axis(q[:, 1:], first[:, None], axis=1) > 0)
     given = np.insert(axes, 0, 0, axis=1)
     assert oracles.between_rotations(exact, given).max() < 2 * EPS
-    w = rb.rotation_vector_from_quaternion(given)
-    assert np.array_equal(rb.rotation_vector_from_quaternion(-given), w)
+    w = rb.quaternion.rotation_vector_from_quaternion(given)
+    assert np.array_equal(rb.quaternion.rotation_vector_from_quaternion(-given), w)
     assert np.abs(w - np.pi * axes * np.sign(np.vecdot(exact, given))[:, None]).max() < 4 * EPS
     for R in (matrices, rb.matrix_from_quaternion(given)):
         assert np.abs(rb.log_so3(R) - w).max() < 8 * EPS
@@ -47,20 +49,22 @@ def test_exact_and_rounded_half_turns_have_the_documented_sign():
 @pytest.mark.source("BK 2.5", "RR 2.2")
 def test_rotation_vectors_and_quaternions_agree_with_mpmath():
     vectors, axis = awkward.ROTATION_VECTORS, awkward.UNIT_AXES
-    q = rb.quaternion_from_rotation_vector(vectors)
+    q = rb.quaternion.quaternion_from_rotation_vector(vectors)
     exact = np.array([oracles.quaternion(w) for w in vectors])
     assert np.abs(q - exact)[:, 0].max() < 2 * EPS
     assert np.all(np.abs(q - exact)[:, 1:] <= 3 * EPS * np.abs(exact[:, 1:]))
-    back = rb.rotation_vector_from_quaternion(exact)
+    back = rb.quaternion.rotation_vector_from_quaternion(exact)
     off = np.abs(back - vectors)
     assert np.all(off <= 4 * EPS * np.linalg.norm(vectors, axis=-1, keepdims=True))
-    assert np.array_equal(rb.rotation_vector_from_quaternion(-exact), back)
-    back = rb.rotation_vector_from_quaternion(rb.quaternion_from_rotation_vector(4 * axis))
+    assert np.array_equal(rb.quaternion.rotation_vector_from_quaternion(-exact), back)
+    back = rb.quaternion.rotation_vector_from_quaternion(
+        rb.quaternion.quaternion_from_rotation_vector(4 * axis)
+    )
     assert np.abs(back + (2 * np.pi - 4) * axis).max() < 4 * EPS
-    off = rb.quaternion_from_rotation_vector(2 * np.pi * axis) - [-1, 0, 0, 0]
+    off = rb.quaternion.quaternion_from_rotation_vector(2 * np.pi * axis) - [-1, 0, 0, 0]
     assert np.abs(off).max() < 2 * EPS
     turns = np.array([3, 9, -20.0])[:, None] * axis[3]
-    R = rb.matrix_from_quaternion(rb.quaternion_from_rotation_vector(turns))
+    R = rb.matrix_from_quaternion(rb.quaternion.quaternion_from_rotation_vector(turns))
     assert np.abs(R - rb.exp_so3(turns)).max() < 40 * EPS
 
 

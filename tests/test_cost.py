@@ -40,17 +40,17 @@ def test_costs_of_turns_about_one_axis_agree_with_formulas():
     """A cubic from rest to rest over the angle a costs 2 · 12 a². A projected line costs 2 ∫ (a
     θ'')²."""
     turn = rb.exp_so3([0, 0.9, 0])
-    optimum = rb.minimum_acceleration_so3(I3, turn, REST, REST)
+    optimum = rb.minimum_acceleration(I3, turn, REST, REST)
     assert rb.acceleration_cost(optimum) == pytest.approx(24 * 0.81, rel=1e-10)
     want = gauss(lambda t: 2 * (0.9 * theta(t, 0.9, 2)) ** 2)
-    assert rb.acceleration_cost(rb.projected_line_so3(I3, turn)) == pytest.approx(want, rel=1e-10)
+    assert rb.acceleration_cost(rb.projected_line(I3, turn)) == pytest.approx(want, rel=1e-10)
 
 
 @pytest.mark.source("BK (18)", "BK (14)", "beyond BK 9")
 def test_the_parts_of_the_cost_on_se3_agree_with_their_integrals():
     """∫ m ‖d_c''‖² is computed from the positions of the centre, by a Chebyshev series."""
     A1 = rb.pose_from_coordinates([0.5, 0.4, 0.3, 1, 2, 3])
-    curve = rb.projected_cubic_se3(I4, A1, [1, 2, 0], [0, -1, 1], [1, 1, 1], [1, 0, 3])
+    curve = rb.projected_cubic(I4, A1, [1, 2, 0], [0, -1, 1], [1, 1, 1], [1, 0, 3])
     parts = rb.acceleration_cost_parts(curve)
     squares = gauss(lambda t: np.moveaxis(curve(t, 2) ** 2, -1, 0)).reshape(2, 3)
     assert parts == pytest.approx(squares.sum(axis=1) * [2, 1], rel=1e-10)
@@ -70,8 +70,8 @@ def test_the_parts_of_the_cost_on_se3_agree_with_their_integrals():
 @pytest.mark.source("BK 2.6")
 def test_geodesics_cost_nothing():
     A1 = rb.pose_from_coordinates([0, 0, 1, 2, 0, 0])
-    assert rb.acceleration_cost(rb.geodesic_se3(I4, A1)) == 0
-    screw = rb.screw_se3(I4, A1)
+    assert rb.acceleration_cost(rb.geodesic(I4, A1)) == 0
+    screw = rb.screw(I4, A1)
     rotation, translation = rb.acceleration_cost_parts(screw)
     assert rotation == 0
     across = np.cross(screw.twist[:3], screw.twist[3:])
@@ -88,14 +88,14 @@ def test_the_cost_of_sharp_turns_is_accurate(margin):
     turn = about_z(np.pi - margin)
     k = np.tan((np.pi - margin) / 2)  # aθ = a/2 + atan u, u = (2t − 1) k; ∫ u²/(1 + u²)⁴ du = π/16
     for line in (
-        rb.projected_line_so3(I3, turn, duration=3),
-        rb.chain([2, 5], [I3, turn], leg=rb.projected_line_so3),
+        rb.projected_line(I3, turn, duration=3),
+        rb.chain([2, 5], [I3, turn], leg=rb.projected_line),
     ):
         assert rb.acceleration_cost(line) == pytest.approx(4 * np.pi * k**3 / 27, rel=1e-9)
         least = np.abs(np.setdiff1d(line.breakpoints, 0.5) - 0.5).min()
         assert margin / 20 < least < margin / 4
     # at half time, the cubic turns 3/2 times as fast
-    cubic = rb.projected_cubic_so3(I3, turn, REST, REST)
+    cubic = rb.projected_cubic(I3, turn, REST, REST)
     assert rb.acceleration_cost(cubic) == pytest.approx(27 / 8 * 4 * np.pi * k**3, rel=20 * margin)
 
 
@@ -106,7 +106,7 @@ def late_line(when, angle):
         x = np.tanh(2000 * (t - when))
         return [(1 + x) / 2, 1000 * (1 - x * x), -4e6 * x * (1 - x * x)][order]
 
-    return rb.projected_line_so3(I3, about_z(angle), late), [when]
+    return rb.projected_line(I3, about_z(angle), late), [when]
 
 
 def cubic(when, off):
@@ -116,7 +116,7 @@ def cubic(when, off):
     turn = np.exp(2.5j)
     columns = np.array([1j * h10, 1j * turn * h11, -h00 - turn * h01])
     k0, k1 = np.linalg.solve(*np.split(np.array([columns.real, columns.imag]), [2], axis=1))[:, 0]
-    curve = rb.projected_cubic_so3(I3, about_z(2.5), [0, 0, k0 + off], [0, 0, k1])
+    curve = rb.projected_cubic(I3, about_z(2.5), [0, 0, k0 + off], [0, 0, k1])
     assert curve.margin_time == pytest.approx(when, abs=off)
     assert curve.margin < off
     return curve, [curve.margin_time]
@@ -125,7 +125,7 @@ def cubic(when, off):
 def cubic_of_quaternions(margin):
     """Return a turn by 2 rad about an axis; the complex Q(1/2) is cos(1/2) + k/8 sin(1/2)."""
     k = 8 * (margin - np.cos(0.5)) / np.sin(0.5)
-    curve = rb.quaternion_cubic_so3(I3, about_z(2.0), [0, 0, k], [0, 0, k])
+    curve = rb.closed_forms.quaternion_cubic(I3, about_z(2.0), [0, 0, k], [0, 0, k])
     assert curve.margin == pytest.approx(margin)
     return curve, [0.5]
 
@@ -141,7 +141,7 @@ def cayleys_cubic(short_of):
     square, cube = 3 * goal - w0 - rate, w0 / 2 + rate - 2 * goal
     length = sum(Polynomial(c) ** 2 for c in zip(0 * w0, w0 / 2, square, cube, strict=True))
     quick = [t.real for t in length.deriv().roots() if abs(t.imag) < 1e-6]
-    return rb.cayley_cubic_so3(I3, rb.exp_so3((np.pi - short_of) * n), w0, w1), quick
+    return rb.closed_forms.cayley_cubic(I3, rb.exp_so3((np.pi - short_of) * n), w0, w1), quick
 
 
 @pytest.mark.parametrize(
@@ -162,14 +162,16 @@ def test_the_cost_of_a_sudden_turn_is_accurate(make, given):
 @pytest.mark.parametrize("speed", [1e3, 1e12, 1e26])
 def test_the_cost_of_a_very_fast_start_is_accurate(speed):
     """M(t) = I + t M'(0) + … turns immediately, so the cost grows as the cube of the speed."""
-    cubic = rb.projected_cubic_so3(I3, I3, [speed] * 3, REST)
+    cubic = rb.projected_cubic(I3, I3, [speed] * 3, REST)
     a = np.sqrt(3) * speed  # along one axis, θ = atan(a t)
     want = 2 * a**3 * quad(lambda u: (2 * u / (1 + u * u) ** 2) ** 2, 0, np.inf)[0]
     assert rb.acceleration_cost(cubic) == pytest.approx(want, rel=5 / speed + 1e-9)
 
 
 def test_panels_are_equally_fine_for_motions_about_each_axis():
-    one, *others = (rb.exponential_cubic_so3(I3, I3, 1e3 * x, 1e3 * x).breakpoints for x in I3)
+    one, *others = (
+        rb.closed_forms.exponential_cubic(I3, I3, 1e3 * x, 1e3 * x).breakpoints for x in I3
+    )
     assert len(one) > 17
     assert all(other == pytest.approx(one, rel=1e-9) for other in others)
 
@@ -177,13 +179,13 @@ def test_panels_are_equally_fine_for_motions_about_each_axis():
 def test_the_cost_of_a_jump_raises_an_error():
     for turn in (np.diag([-1.0, -1, 1]), np.diag([1.0, -1, -1]), about_z(np.pi - 5e-7)):
         with pytest.warns(RuntimeWarning, match="margin < 1e-6"):
-            jump = rb.projected_cubic_so3(I3, turn, [0, 1e-9, 0], REST)
+            jump = rb.projected_cubic(I3, turn, [0, 1e-9, 0], REST)
         with pytest.raises(RuntimeError, match="almost jumps"):
             rb.acceleration_cost(jump)
     with pytest.raises(RuntimeError, match="almost jumps"):
         rb.acceleration_cost(cubic_of_quaternions(0)[0])
     with pytest.warns(RuntimeWarning):
-        stack = rb.minimum_acceleration_so3(I3, about_z(1), *[[REST, [1e160, 0, 0]]] * 2)
+        stack = rb.minimum_acceleration(I3, about_z(1), *[[REST, [1e160, 0, 0]]] * 2)
     with pytest.raises(RuntimeError, match=r"^acceleration cost of curve \[1\]: the curve is NaN"):
         rb.acceleration_cost(stack)
 
@@ -192,19 +194,19 @@ def test_an_integral_that_does_not_converge_raises_an_error():
     noise, turn = np.random.default_rng(0), (np.pi - 1e-6) * np.array([1, 2, 2]) / 3
 
     def line(bend):
-        return rb.projected_line_so3(I3, about_z(1), lambda t, k: bend(t) if k == 2 else t)
+        return rb.projected_line(I3, about_z(1), lambda t, k: bend(t) if k == 2 else t)
 
     for curve in (
         line(lambda t: noise.normal(size=t.shape)),
         line(lambda t: np.where(abs(t - 0.5) < 0.4, 1e160, 0)),
         # accuracy is limited by rounding
-        rb.cayley_cubic_so3(I3, rb.exp_so3(turn), [1, 0, 0], [0, 2, 0]),
+        rb.closed_forms.cayley_cubic(I3, rb.exp_so3(turn), [1, 0, 0], [0, 2, 0]),
     ):
         with np.errstate(over="ignore"), pytest.raises(RuntimeError, match="has an uncertainty"):
             rb.acceleration_cost(curve)
 
 
-@pytest.mark.parametrize("make", [rb.projected_cubic_so3, rb.quaternion_cubic_so3])
+@pytest.mark.parametrize("make", [rb.projected_cubic, rb.closed_forms.quaternion_cubic])
 def test_a_stack_has_one_cost_for_each_curve(make):
     turns = rb.exp_so3(np.linspace(0.5, 2.9, 6).reshape(2, 3, 1) * [0.6, 0, 0.8])
     stack = make(I3, turns, REST, [0, 2, 0])
@@ -218,7 +220,7 @@ def test_a_stack_has_one_cost_for_each_curve(make):
             one = cost(stack[i], each[i] if G is each else G)
             assert costs[i] == pytest.approx(one, rel=2e-10)
     assert rb.acceleration_cost(rb.retime(stack[:, :0], 3)).shape == (2, 0)
-    assert np.all(rb.acceleration_cost(rb.retime(stack, 1e120)) == 0)
+    assert np.all(rb.acceleration_cost(stack.retimed(1e120)) == 0)
     for curve, G, message in (
         (stack[0, 0], each, r"^inertia: a single matrix or a stack of shape \(\)"),
         (stack[0], [BOOK] * 2, r"do not broadcast: curve \(3,\), inertia \(2,\)"),
@@ -227,13 +229,13 @@ def test_a_stack_has_one_cost_for_each_curve(make):
             rb.torque_cost(curve, G)
 
 
-CURVES = rb.CLOSED_FORMS | {
-    "geodesic": lambda R0, R1, w0, w1: rb.geodesic_so3(R0, R1),
-    "line": lambda R0, R1, w0, w1: rb.projected_line_so3(R0, R1),
-    "optimum": rb.minimum_acceleration_so3,
-    "retimed": lambda *ends: rb.retime(rb.cumulative_bezier_so3(*ends), 1.7),
+CURVES = rb.closed_forms.FORMS | {
+    "geodesic": lambda R0, R1, w0, w1: rb.geodesic(R0, R1),
+    "line": lambda R0, R1, w0, w1: rb.projected_line(R0, R1),
+    "optimum": rb.minimum_acceleration,
+    "retimed": lambda *ends: rb.retime(rb.closed_forms.cumulative_bezier(*ends), 1.7),
     "quintics": lambda R0, R1, w0, w1: rb.retime(
-        rb.exponential_quintic_so3(R0, R1, w0, w1, w1, w0), 0.6
+        rb.closed_forms.exponential_quintic(R0, R1, w0, w1, w1, w0), 0.6
     ),
 }
 
@@ -260,30 +262,30 @@ def test_a_smooth_chain_costs_the_sum_of_its_legs():
     w, a = np.array([[0, 0, 0], [0.2, 0.5, 0.5], [0, 0, 0]]), [REST, [0.3, -0.2, 0.1], REST]
 
     def leg(R0, R1, w0, w1, duration):
-        return rb.exponential_quintic_so3(R0, R1, w0, w1, a[:2], a[1:], duration=duration)
+        return rb.closed_forms.exponential_quintic(R0, R1, w0, w1, a[:2], a[1:], duration=duration)
 
     chain = rb.chain([0, 1, 3], R, velocities=w, leg=leg)
     legs = leg(R[:2], R[1:], w[:2], w[1:], duration=[1, 2])
     for cost in (rb.jerk_cost, lambda curve: rb.torque_cost(curve, BOOK)):
         assert cost(chain) == pytest.approx(cost(legs).sum(), rel=1e-10)
-    cubics = rb.chain([0, 1, 3], R, velocities=w, leg=rb.bezier_so3)
-    two = rb.bezier_so3(R[:2], R[1:], w[:2], w[1:], duration=[1, 2])
+    cubics = rb.chain([0, 1, 3], R, velocities=w, leg=rb.closed_forms.bezier)
+    two = rb.closed_forms.bezier(R[:2], R[1:], w[:2], w[1:], duration=[1, 2])
     assert rb.torque_cost(cubics, BOOK) == pytest.approx(rb.torque_cost(two, BOOK).sum(), rel=1e-9)
     poses = rb.pose_from_components(R, np.array(a) - w)
     motion = rb.chain([0, 1, 3], poses)
     parts = [sum(x) for x in zip(*map(rb.acceleration_cost_parts, motion.legs), strict=True)]
     assert rb.acceleration_cost_parts(motion) == pytest.approx(parts, rel=1e-9)
-    twice = rb.acceleration_cost(rb.retime(motion, 6))
+    twice = rb.acceleration_cost(motion.retimed(6))
     assert twice == pytest.approx(sum(parts) / 8, rel=1e-9)
     with pytest.raises(RuntimeError, match=r"^jerk cost: an acceleration jumps at a joint, by"):
         rb.jerk_cost(cubics)
     with pytest.raises(RuntimeError, match=r"^torque cost: a velocity jumps at a joint, by"):
-        rb.torque_cost(rb.chain([0, 1, 3], R, leg=rb.geodesic_so3), BOOK)
+        rb.torque_cost(rb.chain([0, 1, 3], R, leg=rb.geodesic), BOOK)
 
 
 @pytest.mark.parametrize("unit", [1e-4, 1, 1e4])
 @pytest.mark.parametrize(
-    "leg", [rb.exponential_cubic_so3, rb.bezier_so3, rb.minimum_acceleration_so3]
+    "leg", [rb.closed_forms.exponential_cubic, rb.closed_forms.bezier, rb.minimum_acceleration]
 )
 def test_a_steady_turn_of_several_legs_has_no_jerk(leg, unit):
     """The accelerations of the turn, and their jumps at the joints, are rounding errors."""
@@ -295,9 +297,9 @@ def test_a_steady_turn_of_several_legs_has_no_jerk(leg, unit):
 @pytest.mark.parametrize("size", [1e-12, 1e-8, 1.0, 1e8])
 def test_costs_scale_with_the_unit_of_inertia(size):
     G, w0 = size * np.diag([1.0, 2, 2.9]), np.array([0.8, 0.1, 1.2])
-    A, w = rb.geodesic_flow(G / size, I3, w0, [0.0, 1.0])
+    A, w = rb.connection.geodesic_flow(G / size, I3, w0, [0.0, 1.0])
     ends = I3, A[1], w0, w[1]
-    free, other = rb.minimum_torque_so3(*ends, G), rb.bezier_so3(*ends)
+    free, other = rb.minimum_torque(*ends, G), rb.closed_forms.bezier(*ends)
     for cost, power in ((rb.torque_cost, 2), (rb.acceleration_cost, 1)):
         assert cost(free, G) < 1e-18 * size**power
         assert cost(other, G) == pytest.approx(size**power * cost(other, G / size), rel=1e-12)
@@ -306,7 +308,7 @@ def test_costs_scale_with_the_unit_of_inertia(size):
 @pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-8, 1e-12])
 def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
     """One of the two tested lines turns fast at half time."""
-    curve = rb.projected_line_so3(I3, rb.exp_so3([[0.3, 1, -0.5], [2, 2, 0.5]]))
+    curve = rb.projected_line(I3, rb.exp_so3([[0.3, 1, -0.5], [2, 2, 0.5]]))
     for cost in (
         partial(rb.acceleration_cost, curve),
         lambda **rtol: rb.acceleration_cost_parts(curve, BOOK, **rtol)[0],
@@ -319,7 +321,7 @@ def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
 
 
 def test_bad_arguments_are_refused():
-    line, motion = rb.geodesic_so3(I3, I3), rb.geodesic_se3(I4, I4)
+    line, motion = rb.geodesic(I3, I3), rb.geodesic(I4, I4)
     acceleration, jerk, torque = rb.acceleration_cost, rb.jerk_cost, rb.torque_cost
     for cost, given, message in (
         (partial(acceleration, mass=0), motion, "^mass is 0.0"),

@@ -22,7 +22,7 @@ TURNS = RNG.normal(size=(30, 3))
 TURNS *= (ANGLES / np.linalg.norm(TURNS, axis=1))[:, None]
 TURNED = np.array([oracles.exp_so3(w) for w in TURNS])
 GOALS = STARTS @ TURNED
-GEODESICS = rb.geodesic_so3(STARTS, GOALS)
+GEODESICS = rb.geodesic(STARTS, GOALS)
 I3, REST = np.eye(3), np.zeros(3)
 
 
@@ -37,7 +37,7 @@ def squared(t, order):
 
 @pytest.mark.source("BK 6.1", "BK Remark 7")
 def test_the_geodesic_agrees_with_slerp():
-    R, from_I = GEODESICS(TIMES), rb.geodesic_so3(I3, TURNED)(TIMES)
+    R, from_I = GEODESICS(TIMES), rb.geodesic(I3, TURNED)(TIMES)
     want = np.array([[oracles.exp_so3(t * w) for w in TURNS] for t in TIMES])
     assert np.abs(from_I - want).max() < 8 * EPS
     assert np.abs(R - STARTS @ want).max() < 20 * EPS
@@ -53,7 +53,7 @@ def test_the_geodesic_agrees_with_slerp():
 @pytest.mark.parametrize("timing", [None, quick])
 def test_the_projected_line_is_the_projection_of_the_line(timing):
     """The rotation from the start to any point of the curve is about the axis of the geodesic."""
-    curves, t = rb.projected_line_so3(STARTS, GOALS, timing), np.linspace(0, 1, 1001)[::50]
+    curves, t = rb.projected_line(STARTS, GOALS, timing), np.linspace(0, 1, 1001)[::50]
     x = (t if timing is None else quick(t, 0))[:, None, None, None]
     M = STARTS + (GOALS - STARTS) * x
     R = rb.project_so(M)
@@ -69,7 +69,7 @@ def test_the_projected_line_is_the_projection_of_the_line(timing):
 @pytest.mark.source("BK Cor. 2")
 def test_the_line_with_the_timing_f_projects_to_the_geodesic():
     angle = np.linalg.norm(GEODESICS.rotation_vector, axis=-1)
-    lines = rb.projected_line_so3(STARTS, GOALS, lambda t, order: f(t, angle, order))
+    lines = rb.projected_line(STARTS, GOALS, lambda t, order: f(t, angle, order))
     growth = 1 + 2 * np.tan(angle / 2) / np.maximum(angle, 1)
     for order in (0, 1, 2):
         core = (-2, -1) if order == 0 else -1
@@ -78,11 +78,11 @@ def test_the_line_with_the_timing_f_projects_to_the_geodesic():
 
 
 def at_rest(R0, R1):
-    return rb.projected_cubic_so3(R0, R1, REST, REST)
+    return rb.projected_cubic(R0, R1, REST, REST)
 
 
 def quintic_at_rest(R0, R1):
-    return rb.projected_quintic_so3(R0, R1, *[REST] * 4)
+    return rb.projected_quintic(R0, R1, *[REST] * 4)
 
 
 def half_turns():
@@ -99,7 +99,7 @@ def test_the_geodesic_over_a_half_turn_follows_rodrigues_formula():
     # the first of the largest components of the axis is positive
     first = np.argmax(np.abs(n) > np.abs(n).max(axis=1, keepdims=True) - 1e-9, axis=1)
     n *= np.sign(np.take_along_axis(n, first[:, None], axis=1))
-    curves, cross = rb.geodesic_so3(R0, R1), rb.hat_so3(n)
+    curves, cross = rb.geodesic(R0, R1), rb.hat_so3(n)
     assert np.abs(curves.rotation_vector - np.pi * n).max() < 40 * EPS
     assert np.abs(curves(1) - R1).max() < 40 * EPS
     for t in (1e-9, 0.25, 0.5, 1 - 2.0**-53, 1):
@@ -111,7 +111,7 @@ def test_the_geodesic_over_a_half_turn_follows_rodrigues_formula():
 def test_a_projected_line_over_a_half_turn_is_undefined_halfway():
     for R0, R1, _ in zip(*half_turns(), strict=True):
         with pytest.warns(RuntimeWarning, match="^margin < 1e-6: .* jumps there"):
-            curve = rb.projected_line_so3(R0, R1)
+            curve = rb.projected_line(R0, R1)
         assert 0 <= curve.margin < 8 * EPS
         assert np.abs(curve([0, 0.25, 0.75, 1]) - [R0, R0, R1, R1]).max() < 80 * EPS
         for order in (0, 1, 2):
@@ -123,8 +123,8 @@ def test_a_projected_line_over_a_half_turn_is_undefined_halfway():
 @pytest.mark.parametrize(
     ("make", "where", "share"),
     [
-        (rb.projected_line_so3, "t", lambda t: t),
-        (lambda R0, R1: rb.projected_line_so3(R0, R1, squared), r"f\(t\)", lambda t: t * t),
+        (rb.projected_line, "t", lambda t: t),
+        (lambda R0, R1: rb.projected_line(R0, R1, squared), r"f\(t\)", lambda t: t * t),
         (at_rest, "t", lambda t: 3 * t**2 - 2 * t**3),
     ],
 )
@@ -142,7 +142,7 @@ def test_a_curve_near_the_singular_set_is_accurate_or_gives_a_warning(make, wher
         assert abs(rb.log_so3(curve(t))[2] - want) < 40 * EPS / gap
 
 
-@pytest.mark.parametrize("make", [rb.projected_line_so3, at_rest, quintic_at_rest])
+@pytest.mark.parametrize("make", [rb.projected_line, at_rest, quintic_at_rest])
 def test_a_jump_gives_a_warning(make):
     """If a half-turn goes from rest to rest, its matrix M(t) has rank 1 at half time."""
     half = np.diag([1.0, -1, -1])
@@ -159,7 +159,7 @@ def test_a_jump_gives_a_warning(make):
         with pytest.raises(ValueError, match=r"^t = 0\.5: the nearest rotation is not unique"):
             one([0.3, 0.5], order)
         with pytest.raises(ValueError, match=r"^t = 1\.5: the nearest rotation is not unique"):
-            rb.retime(one, 3)(1.5, order)
+            one.retimed(3)(1.5, order)
         for k in (0, 999):
             times, late = (np.where(np.arange(1000) == k, 0.5, t).reshape(10, 100), own.copy())
             late[k, 0, 1] = 0.5
@@ -174,7 +174,7 @@ def test_f_may_miss_its_end_value_by_a_rounding_error():
         return (t * (1 + 1e-14), 2 * np.sqrt(t), 2)[order]
 
     for pair in ((in_place, squared), (lambda t, order: (t, 1, 0)[order], None)):
-        curve, want = (rb.projected_line_so3(STARTS[:2], GOALS[:2], one) for one in pair)
+        curve, want = (rb.projected_line(STARTS[:2], GOALS[:2], one) for one in pair)
         for order in (0, 1, 2):
             assert np.abs(curve(TIMES, order) - want(TIMES, order)).max() < 1e-10
 
@@ -192,7 +192,7 @@ def test_f_may_miss_its_end_value_by_a_rounding_error():
 )
 def test_an_f_that_is_not_a_timing_is_refused(timing, message):
     with pytest.raises(ValueError, match=message):
-        rb.projected_line_so3(STARTS[0], GOALS[0], timing)
+        rb.projected_line(STARTS[0], GOALS[0], timing)
 
 
 def test_the_error_names_the_time_and_the_curve_at_which_f_fails():
@@ -200,7 +200,7 @@ def test_the_error_names_the_time_and_the_curve_at_which_f_fails():
         rates = [t + np.array([0, 0.1, 0]) * (t * (1 - t)), np.array([1, np.nan, 1]) + 0 * t]
         return rates[order]
 
-    stack = rb.projected_line_so3(I3, rb.exp_so3(I3), rates)
+    stack = rb.projected_line(I3, rb.exp_so3(I3), rates)
     for call, t, time in ((stack, 0.6, 0.6), (stack.at_own_times, [0.1, 0.2, 0.3], 0.2)):
         with pytest.raises(ValueError, match=rf"^t = {time} of curve \[1\]: f\(t, 1\) is not a fi"):
             call(t, 1)
@@ -209,7 +209,7 @@ def test_the_error_names_the_time_and_the_curve_at_which_f_fails():
     def lost(s, order):
         return np.where(s == t[5000], np.nan, squared(s, order))
 
-    line = rb.projected_line_so3(I3, rb.exp_so3([0, 1, 0]), lost)
+    line = rb.projected_line(I3, rb.exp_so3([0, 1, 0]), lost)
     for order in (0, 1, 2):
         with pytest.raises(ValueError, match=r"^t = 0\.8333\d*: f\(t, 0\) is not a finite"):
             line(t, order)
@@ -220,5 +220,5 @@ def test_errors_can_be_pickled():
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error) == "t = 0.5 of curve [1, 1]: no rotation"
     assert (again.time, again.curve, again.reason) == (0.5, 3, "no rotation")
-    lost = pickle.loads(pickle.dumps(rb.ConvergenceError(1e-3, 5)))
+    lost = pickle.loads(pickle.dumps(rb.optimum.ConvergenceError(1e-3, 5)))
     assert (lost.residual, lost.iterations) == (1e-3, 5)

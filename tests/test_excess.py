@@ -18,12 +18,12 @@ FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)
 
 def bent(*ends, bend):
     """Return quintics with random end accelerations; some cost much more than the optimum."""
-    return rb.exponential_quintic_so3(
+    return rb.closed_forms.exponential_quintic(
         *ends, *bend * np.random.default_rng(4).normal(size=(2, *ends[2].shape))
     )
 
 
-CURVES = rb.CLOSED_FORMS | {f"bent by {x}": partial(bent, bend=x) for x in (0.3, 3.0)}
+CURVES = rb.closed_forms.FORMS | {f"bent by {x}": partial(bent, bend=x) for x in (0.3, 3.0)}
 
 
 @cache
@@ -33,7 +33,7 @@ def problems(count, size, seed, scale=1.0):
     R0, R1, w0, w1 = random_problems(count, size, rng=seed)
     turn = scale * rb.log_so3(R0.mT @ R1)
     ends = Ends(R0, R0 @ rb.exp_so3(turn), scale * w0, scale * w1)
-    return ends, cost(rb.minimum_acceleration_so3(*ends))
+    return ends, cost(rb.minimum_acceleration(*ends))
 
 
 def cost(curve):
@@ -65,7 +65,7 @@ def test_the_constants_of_the_excess_near_a_geodesic_are_right():
     across_e, across_d = ss * ee - se**2, ss * dd - sd**2  # |σ × e|², |σ × d|²
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
     wanted = {
-        "projected_cubic_so3": projection,
+        "projected_cubic": projection,
         "quaternion_cubic_so3": projection * Q(1, 16),
         "exponential_cubic_so3": ss * across_e * Q(1, 175),
         "bezier_so3": ss * (across_d * Q(1, 14580) + across_e * Q(1, 14175)),
@@ -84,7 +84,7 @@ def test_only_projection_and_quaternions_have_an_excess_from_rest_to_rest():
     ss, projection = exact.ss, Q(6401, 180180)
     at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
     wanted = dict.fromkeys(("exponential_cubic_so3", "bezier_so3", "cumulative_bezier_so3"), 0)
-    wanted |= {"projected_cubic_so3": projection, "quaternion_cubic_so3": projection / 16}
+    wanted |= {"projected_cubic": projection, "quaternion_cubic_so3": projection / 16}
     for name, factor in wanted.items():
         found = FORMS[name].compose(list(at_rest.items())).exquo(12 * ss)
         assert found == factor * ss**2, name
@@ -144,7 +144,7 @@ def test_a_false_ordering_is_not_proven(tmp_path):
         assert changed != rows
         table = tmp_path / f"{k}.csv"
         table.write_text("\n".join(changed))
-        with pytest.raises(ValueError, match=r"^not proven: projected_cubic_so3"):
+        with pytest.raises(ValueError, match=r"^not proven: projected_cubic"):
             ordering.verify(table)
 
 
@@ -187,7 +187,7 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
     order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
-    curves = rb.CLOSED_FORMS[f"{name}_cubic_so3"](I3, rb.exp_so3(sigma), sigma, sigma)
+    curves = rb.closed_forms.FORMS[f"{name}_cubic_so3"](I3, rb.exp_so3(sigma), sigma, sigma)
     found = rb.acceleration_cost(curves) / 2 * over / sizes**10
     assert found == pytest.approx(1, abs=0.1)
     assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # the relative error is of second order
@@ -225,14 +225,18 @@ def test_the_correction_turns_in_the_direction_of_beziers_curve():
     ends = I3, rb.exp_so3(turn), *([0, 0, -3] + 0.3 * rng.normal(size=(2, 20, 3)))
     plain, corrected, best = (
         rb.acceleration_cost(make(*ends))
-        for make in (rb.bezier_so3, rb.corrected_bezier_so3, rb.minimum_acceleration_so3)
+        for make in (
+            rb.closed_forms.bezier,
+            rb.closed_forms.corrected_bezier,
+            rb.minimum_acceleration,
+        )
     )
     assert np.all(corrected - best < 0.5 * (plain - best) + 1e-9 * best)
 
 
 def test_estimates_do_not_depend_on_the_duration():
     ends = Ends(*(x.reshape(2, 3, *x.shape[1:]) for x in random_problems(6, 0.5, rng=1)))
-    curves = rb.bezier_so3(*ends)
+    curves = rb.closed_forms.bezier(*ends)
     estimate = rb.excess_estimate(curves)
     assert estimate.shape == (2, 3)
     for T in (1, 20):
@@ -242,21 +246,21 @@ def test_estimates_do_not_depend_on_the_duration():
 
 def test_a_chain_is_compared_with_optimal_legs():
     t, R = [0, 1, 3], rb.exp_so3([[0, 0, 0], [0, 0.2, 0.5], [0.6, 0.2, 0.9]])
-    chain = rb.projected_spline_so3(t, R)
-    optimal = rb.chain(t, R, chain.velocities, leg=rb.minimum_acceleration_so3)
+    chain = rb.projected_spline(t, R)
+    optimal = rb.chain(t, R, chain.velocities, leg=rb.minimum_acceleration)
     excess = rb.acceleration_cost(chain) / rb.acceleration_cost(optimal) - 1
     assert rb.excess_estimate(chain) == pytest.approx(excess, rel=0.02)
     assert abs(rb.excess_estimate(optimal)) < 1e-22
 
 
 def test_the_estimate_is_zero_for_an_optimum():
-    best = rb.minimum_acceleration_so3(*random_problems(50, 0.6, rng=9))
+    best = rb.minimum_acceleration(*random_problems(50, 0.6, rng=9))
     assert np.all(np.abs(rb.excess_estimate(best)) < 1e-22)
     ends = I3, rb.exp_so3([0, 0, 0.5]), [0, 0, 0.5], [0, 0, 0.5]
-    assert np.isnan(rb.excess_estimate(rb.geodesic_so3(*ends[:2])))
+    assert np.isnan(rb.excess_estimate(rb.geodesic(*ends[:2])))
     w0, w1 = [[0, 0, 0.5], [1e160, 0, 0]], [[0, 0.5, 0], [0, 1e160, 0]]
     with pytest.warns(RuntimeWarning, match="1 of 2 problems did not converge"):
-        lost = rb.minimum_acceleration_so3(*ends[:2], w0, w1)
+        lost = rb.minimum_acceleration(*ends[:2], w0, w1)
     assert np.array_equal(np.isnan(rb.excess_estimate(lost)), [False, True])
 
 
@@ -268,7 +272,7 @@ def test_a_curve_that_is_not_smooth_has_no_estimate():
         smooth = 3 * t**2 - 2 * t**3, 6 * t - 6 * t**2, 6 - 12 * t, -12
         return smooth[order] + 40**order * bumps[order]
 
-    line = rb.projected_line_so3(I3, rb.exp_so3([0, 0, 0.5]), jolt)
+    line = rb.projected_line(I3, rb.exp_so3([0, 0, 0.5]), jolt)
     assert np.isnan(rb.excess_estimate(line))
     assert rb.acceleration_cost(line) < 1.5 * 24 * 0.5**2  # the line is neither costly nor fast
 
@@ -276,7 +280,7 @@ def test_a_curve_that_is_not_smooth_has_no_estimate():
 def test_only_curves_on_so3_have_an_estimate():
     for curve, message in (
         (I3, "curve: a Curve is wanted"),
-        (rb.geodesic_se3(I4, I4), r"on SO\(3\)"),
+        (rb.geodesic(I4, I4), r"on SO\(3\)"),
     ):
         with pytest.raises(ValueError, match=message):
             rb.excess_estimate(curve)

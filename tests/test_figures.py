@@ -218,7 +218,7 @@ def test_the_numbers_of_paper_fig5_are_right():
         assert np.abs(make_interp_spline(t, w, 7)(t, 1) - w_dot)[5:-5].max() < 1e-3
         costs.append([simpson(2 * np.sum(w_dot**2, 1), x=t), 2396])
     assert np.abs(numbers("paper_fig5a")["w1' [rad]"] - solution.sol(t)[7]).max() < 1e-8
-    projected = rb.projected_cubic_so3(np.eye(3), rb.exp_so3(turn), w0, w1)(t)
+    projected = rb.projected_cubic(np.eye(3), rb.exp_so3(turn), w0, w1)(t)
     assert np.abs(drawn - projected).max() < 1e-11
     table = numbers("paper_fig5_costs")
     assert list(table) == ["figure", "curve", "rotation [rad²]", "translation [m²]"]
@@ -294,7 +294,7 @@ def test_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
     # the first 100 cells are along the axis; this one is at 81° and 4.95 rad
     cell = 100 + 4 * 10 + 5
     ends = atlas.atlas_problems(100, rng=11).take(slice(100 * cell, 100 * cell + 100))
-    best = rb.acceleration_cost(rb.minimum_acceleration_so3(*ends))
+    best = rb.acceleration_cost(rb.minimum_acceleration(*ends))
     for name, place in (("median", 49), ("ninety", 89)):
         data = numbers(f"lesson12_{name}_across")
         assert data.pop("family").tolist() == ["across"] * 100
@@ -313,14 +313,14 @@ def test_a_cell_of_the_atlas_of_bodies_agrees_with_its_problems(body):
     assert [data[x] for x in list(data)[1:4]] == pytest.approx([np.radians(63), 3.15, 200])
     ends = atlas.atlas_problems(200, ["any"], rng=31).take(slice(200 * cell, 200 * cell + 200))
     G = atlas.BODIES[body]
-    best = rb.minimum_acceleration_so3(*ends, G).cost
+    best = rb.minimum_acceleration(*ends, G).cost
     makers = {
         "weighted": lambda *few: rb.weighted_cubic_so3(*few, G),
-        "normal": lambda *few: rb.normal_cubic_so3(*few, G),
-        "Bézier": rb.bezier_so3,
+        "normal": lambda *few: rb.closed_forms.normal_cubic(*few, G),
+        "Bézier": rb.closed_forms.bezier,
         "long way": rb.bezier_long_so3,
-        "projection": rb.projected_cubic_so3,
-        "ball's optimum": rb.minimum_acceleration_so3,
+        "projection": rb.projected_cubic,
+        "ball's optimum": rb.minimum_acceleration,
     }
     excess = {curve: atlas.costs(make, ends, G) / best - 1 for curve, make in makers.items()}
     excess["two Béziers"] = np.minimum(excess["Bézier"], excess.pop("long way"))

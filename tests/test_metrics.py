@@ -12,7 +12,7 @@ R, LEFT, RIGHT = rb.sample_rotation((3, 50), rng=1)
 d, e, w, z = RNG.normal(size=(4, 50, 3))
 A, MOVE = rb.pose_from_components(R, d), rb.pose_from_components(LEFT, e)
 S, T = RNG.normal(size=(2, 50, 6))
-ON_SO3, ON_SE3 = (R, LEFT, w, z, rb.BASIS_SO3), (A, MOVE, S, T, rb.BASIS_SE3)
+ON_SO3, ON_SE3 = (R, LEFT, w, z, rb.connection.BASIS_SO3), (A, MOVE, S, T, rb.connection.BASIS_SE3)
 
 
 def assert_close(value, wanted, units=400):
@@ -49,7 +49,7 @@ def test_the_metric_on_poses_is_a_product_without_a_parameter():
     turning[:, 3:], moving[:, :3] = 0, 0
     X, Y = (metrics.tangent_from_components(A, x) for x in (turning, moving))
     assert_close(metrics.inner_se3(X, Y), 0)
-    coupled = rb.METRIC_SE3 + 0.5 * np.eye(6, k=3) + 0.5 * np.eye(6, k=-3)
+    coupled = rb.metrics.METRIC_SE3 + 0.5 * np.eye(6, k=3) + 0.5 * np.eye(6, k=-3)
     assert np.abs(metrics.inner_left_invariant(coupled, A, X, Y)).min() > 1e-3
 
 
@@ -57,8 +57,8 @@ def test_the_metric_on_poses_is_a_product_without_a_parameter():
 def test_a_field_has_its_components_in_the_moved_basis():
     """The printed basis L_i, without its bar, belongs to the identity."""
     X = metrics.tangent_from_components(A, S)
-    moved = np.einsum("ni,nijk->njk", S, A[:, None] @ rb.BASIS_SE3)
-    printed = np.einsum("ni,ijk->njk", S, rb.BASIS_SE3)
+    moved = np.einsum("ni,nijk->njk", S, A[:, None] @ rb.connection.BASIS_SE3)
+    printed = np.einsum("ni,ijk->njk", S, rb.connection.BASIS_SE3)
     assert np.abs(X - moved).max() < 40 * EPS
     assert np.abs(X - printed).max(axis=(1, 2)).min() > 0.1
 
@@ -76,16 +76,19 @@ def test_induced_trace_metrics_are_twice_the_energy_of_a_ball():
     assert_close(metrics.inner_so3(X, Y), 2 * np.vecdot(w, z))
     energy = np.sum((points @ X.mT) ** 2, axis=(-2, -1)) / 6
     assert_close(energy / metrics.inner_so3(X, X), 1, 100)
-    gram, printed = metrics.inner_gl(rb.BASIS_SO3[:, None], rb.BASIS_SO3), np.eye(3)
-    assert np.array_equal(gram, rb.METRIC_SO3)
+    gram, printed = (
+        metrics.inner_gl(rb.connection.BASIS_SO3[:, None], rb.connection.BASIS_SO3),
+        np.eye(3),
+    )
+    assert np.array_equal(gram, rb.metrics.METRIC_SO3)
     assert np.array_equal(gram, 2 * printed)
     X, Y = metrics.tangent_from_components(A, S), metrics.tangent_from_components(A, T)
     wanted = 2 * np.vecdot(S[:, :3], T[:, :3]) + np.vecdot(S[:, 3:], T[:, 3:])
     assert_close(metrics.inner_se3(X, Y), wanted)
     velocities = points @ X[:, :3, :3].mT + X[:, None, :3, 3]
     assert_close(np.sum(velocities**2, axis=(-2, -1)) / 6 / metrics.inner_se3(X, X), 1, 100)
-    gram = metrics.inner_ga(rb.BASIS_SE3[:, None], rb.BASIS_SE3)
-    assert np.array_equal(gram, rb.METRIC_SE3)
+    gram = metrics.inner_ga(rb.connection.BASIS_SE3[:, None], rb.connection.BASIS_SE3)
+    assert np.array_equal(gram, rb.metrics.METRIC_SE3)
     assert np.array_equal(gram, np.diag([2, 2, 2, 1, 1, 1]))
     turn = rb.pose_from_components(RIGHT, np.zeros(3))
     shift = rb.pose_from_components(np.eye(3), [1, 0, 0])
@@ -158,7 +161,7 @@ def test_a_weight_exists_if_the_moments_satisfy_triangle_inequalities():
         least = np.linalg.eigvalsh(W)[:, 0]
         assert_close(least, (moments[0] + moments[1] - moments[2]) / 2, 40)
         assert_close(metrics.inertia_from_weight(W), G, 40)
-        rb.project_so_weighted(np.eye(3), W)  # the weight is accepted
+        rb.projection.project_so_weighted(np.eye(3), W)  # the weight is accepted
     assert np.array_equal(metrics.weight_from_inertia(np.diag([1, 2, 3])), np.diag([2, 1, 0]))
     for moments in ([1, 2, 3 + 1e-13], [1, 2, 4], [-1, 5, 5], [-1e-13, 1, 1], [-2, -2, -2]):
         with pytest.raises(ValueError, match=r"moments .*; each must be at most the sum"):

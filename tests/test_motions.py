@@ -16,7 +16,7 @@ A0, A1 = (
     for _ in range(2)
 )
 RATES = RNG.normal(size=(4, N, 3))
-GEODESICS, SCREWS = rb.geodesic_se3(A0, A1), rb.screw_se3(A0, A1)
+GEODESICS, SCREWS = rb.geodesic(A0, A1), rb.screw(A0, A1)
 TIMES = np.linspace(0, 1, 11)
 BODY = {
     "inertia": np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]]),
@@ -56,18 +56,18 @@ def test_rotation_and_origin_follow_separate_curves(name):
 def test_the_centre_of_mass_of_a_body_follows_a_cubic():
     """The twist refers to the body frame, whose origin is not the centre of mass."""
     t, (w0, w1, *v) = np.linspace(0, 1, 21), RATES
-    motion, r = rb.minimum_acceleration_se3(A0, A1, *RATES, **BODY), BODY["centre"]
+    motion, r = rb.minimum_acceleration(A0, A1, *RATES, **BODY), BODY["centre"]
     A = motion(t)
     centre = (A[..., :3, :3] @ r + A[..., :3, 3]).reshape(21, -1)
     fit = np.polynomial.polynomial.polyfit(t, centre, 3)
     assert np.abs(np.polynomial.polynomial.polyval(t, fit).T - centre).max() < 1e-13
-    alone = on_so3(rb.minimum_acceleration_so3, w0, w1, BODY["inertia"])
+    alone = on_so3(rb.minimum_acceleration, w0, w1, BODY["inertia"])
     assert np.abs(A[..., :3, :3] - alone(t)).max() < 1e-13
     assert np.abs(A[[0, -1]] - [A0, A1]).max() < 1e-14
     S = motion([0, 1], 1)
     assert np.abs(S[..., :3] - [w0, w1]).max() < 1e-13
     assert np.abs(turned(A[[0, -1]], S[..., 3:]) - v).max() < 1e-13
-    heavy = rb.minimum_acceleration_se3(A0, A1, *RATES, **BODY | {"mass": 7.0})
+    heavy = rb.minimum_acceleration(A0, A1, *RATES, **BODY | {"mass": 7.0})
     assert np.array_equal(heavy(t), A)
 
 
@@ -99,7 +99,7 @@ def test_a_screw_is_a_subgroup_only_if_it_starts_at_the_identity():
     assert np.all(np.abs(a @ b - ab).max(axis=(-2, -1)) > 0.1)
     a, b, ab = rb.inverse_se3(A0) @ SCREWS([0.2, 0.5, 0.7])
     assert np.abs(a @ b - ab).max() < 40 * EPS
-    a, b, ab = rb.screw_se3(np.eye(4), A1)([0.2, 0.5, 0.7])
+    a, b, ab = rb.screw(np.eye(4), A1)([0.2, 0.5, 0.7])
     assert np.abs(a @ b - ab).max() < 40 * EPS * np.abs(ab).max()
 
 
@@ -164,11 +164,11 @@ def test_displacements_that_turn_only_by_rounding_errors_are_translations():
         assert np.all(screw.pitch == np.inf)
 
 
-@pytest.mark.parametrize("make", [rb.geodesic_se3, rb.screw_se3])
+@pytest.mark.parametrize("make", [rb.geodesic, rb.screw])
 def test_the_rate_of_the_twist_is_its_derivative(make):
     """The rate of the twist differs from c(t, 2), which is the covariant acceleration."""
     c, t, h = make(A0, A1, duration=2.0), np.linspace(0.1, 1.9, 7), 1e-4
     differences = (c(t + h, 1) - c(t - h, 1)) / (2 * h)
     assert c.twist_rate(t) == pytest.approx(differences, abs=1e-6)
-    turning = rb.geodesic_so3(np.eye(3), rb.exp_so3([0, 0, 1.0]))
+    turning = rb.geodesic(np.eye(3), rb.exp_so3([0, 0, 1.0]))
     assert np.array_equal(turning.twist_rate(t / 2), turning(t / 2, 2))

@@ -76,7 +76,7 @@ def test_the_cost_is_the_integral_of_the_squared_deviation(what):
     rates = (np.moveaxis(curves((x + 1) / 2, k), 0, 1) for k in (1, 2, 3))
     u = deviation(what, problems[4][:, None], *rates)
     assert curves.cost == pytest.approx(np.sum(u**2, axis=-1) @ weights / 2, rel=1e-12)
-    slower = rb.retime(curves, 3.0)
+    slower = curves.retimed(3.0)
     for some_of, i in ((curves, slice(None)), (curves[3], 3), (slower, slice(None))):
         assert COSTS[what](some_of, problems[4][i]) == pytest.approx(some_of.cost, rel=1e-10)
     assert times(slower(1.2), slower.costate(1.2)) == pytest.approx(slower.c, rel=1e-9)
@@ -103,7 +103,7 @@ def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
 def test_a_round_body_has_the_optimum_of_a_ball(what, size):
     """The optimum of an almost round body is near the optimum of a ball."""
     ends, power = random_problems(6, 32)[:4], 2 if what == "torque" else 1
-    curves, of_balls = OPTIMA[what](*ends, size * I3), rb.minimum_acceleration_so3(*ends)
+    curves, of_balls = OPTIMA[what](*ends, size * I3), rb.minimum_acceleration(*ends)
     for order in range(4):
         assert np.array_equal(curves(TIMES, order), of_balls(TIMES, order))
     assert curves.cost == pytest.approx(size**power * of_balls.cost / 2, rel=1e-14)
@@ -139,7 +139,7 @@ def test_the_optimum_of_turns_about_a_principal_axis_is_a_cubic(what, shares):
 @pytest.mark.parametrize("angle", [0.1, 1.0, 2.67, np.pi - 1e-9])
 def test_the_least_jerk_from_rest_to_rest_follows_the_geodesic(angle):
     axis = np.array([0.6, 0, 0.8])
-    curve = rb.minimum_jerk_so3(I3, rb.exp_so3(angle * axis), REST, REST, REST, REST)
+    curve = rb.minimum_jerk(I3, rb.exp_so3(angle * axis), REST, REST, REST, REST)
     share = TIMES**3 * (10 - 15 * TIMES + 6 * TIMES**2)
     assert np.abs(curve(TIMES) - rb.exp_so3(np.outer(angle * share, axis))).max() < 1e-10
     assert curve.cost == pytest.approx(1440 * angle**2, rel=1e-11)
@@ -189,13 +189,15 @@ def test_a_problem_without_convergence_does_not_affect_the_others(what, speed):
 def test_single_problems_without_convergence_raise_an_error():
     R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
     with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
-        curve = rb.minimum_acceleration_so3(I3, R, w, w[::-1])
+        curve = rb.minimum_acceleration(I3, R, w, w[::-1])
     for values in (*(curve(TIMES, order) for order in range(3)), curve.c, curve.cost):
         assert np.isnan(values).all()
     with pytest.raises(ValueError, match=r"^guess: a curve is NaN, since it did not converge"):
-        rb.stationary_so3(curve)
+        rb.optimum.stationary(curve)
     for what, speed in (*((what, 1) for what in OPTIMA), ("ball", 1e-10), ("ball", 1e148)):
-        with pytest.raises(rb.ConvergenceError, match=r"residual \S+ after \d+ iter") as failed:
+        with pytest.raises(
+            rb.optimum.ConvergenceError, match=r"residual \S+ after \d+ iter"
+        ) as failed:
             OPTIMA[what](I3, R, *(speed * w), BOOK, REST, REST)
         assert isinstance(failed.value, RuntimeError)
         assert failed.value.residual > 1e-11
@@ -203,8 +205,8 @@ def test_single_problems_without_convergence_raise_an_error():
     poses, rates = rb.pose_from_components([I3, R], np.eye(2, 3)), np.ones((4, 2, 3))
     rates[:2, 1] = w
     with pytest.warns(RuntimeWarning, match=r"^1 of 2 problems .* \[1\]:"):
-        broken = rb.minimum_acceleration_se3(*poses, *rates)
-    motion = rb.minimum_acceleration_se3(*poses, *rates[:, 0])
+        broken = rb.minimum_acceleration(*poses, *rates)
+    motion = rb.minimum_acceleration(*poses, *rates[:, 0])
     assert np.array_equal(broken.rotation.converged, [True, False])
     assert np.isnan(broken(TIMES)[:, 1, :3, :3]).all()
     for order in range(3):
@@ -217,7 +219,7 @@ def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkey
     turn the other way."""
     real, turns = search._follow, rb.exp_so3([[0, 0, 1], [0, 1, 0], [0, 1, 1]])
     ends = I3, turns, [0, 0, 1], [1, 0, 0]
-    good = rb.minimum_acceleration_so3(*ends)
+    good = rb.minimum_acceleration(*ends)
 
     def failing(task, problem, R, found):
         far = np.trace(R[:, R.shape[1] // 2], axis1=1, axis2=2) < 0
@@ -227,7 +229,7 @@ def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkey
     monkeypatch.setattr(search, "_follow", failing)
     said = r"^1 of 3 problems may not .* \[0\]: a curve that was tried costs less"
     with pytest.warns(RuntimeWarning, match=said) as warned:
-        curves = rb.minimum_acceleration_so3(*ends)
+        curves = rb.minimum_acceleration(*ends)
     assert [warning.filename for warning in warned] == [__file__]
     assert np.array_equal(curves.converged, [False, True, True])
     assert curves.cost[0] > 100
@@ -257,16 +259,16 @@ def test_the_nodes_do_not_depend_on_the_threads_of_blas():
 
 def test_the_solver_improves_a_guess():
     ends = random_problems(6, 42, 2.0, 4.0)[:4]
-    found = rb.stationary_so3(rb.cumulative_bezier_so3(*ends))
-    assert found.cost == pytest.approx(rb.minimum_acceleration_so3(*ends).cost, rel=1e-9)
-    motion = rb.geodesic_se3(np.eye(4), np.eye(4))
+    found = rb.optimum.stationary(rb.closed_forms.cumulative_bezier(*ends))
+    assert found.cost == pytest.approx(rb.minimum_acceleration(*ends).cost, rel=1e-9)
+    motion = rb.geodesic(np.eye(4), np.eye(4))
     for guess in (I3, motion, rb.chain([1, 2], [I3] * 2)):
         with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) that starts at t = 0"):
-            rb.stationary_so3(guess)
+            rb.optimum.stationary(guess)
 
 
 @pytest.mark.parametrize(
-    "make", [rb.minimum_acceleration_so3, rb.minimum_torque_so3, rb.normal_cubic_so3]
+    "make", [rb.minimum_acceleration, rb.minimum_torque, rb.closed_forms.normal_cubic]
 )
 @pytest.mark.parametrize(
     ("G", "message"),

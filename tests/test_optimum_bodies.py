@@ -47,7 +47,7 @@ SELDOM_FOUND = {  # the least known costs of some fast problems in `best`
     "torque": {60 + 16: 2919.2413078, 60 + 27: 2059.4960175},
 }
 TIMES = np.linspace(0, 1, 101)
-OF_SLOW_ENDS = rb.bezier_so3, rb.corrected_bezier_so3  # defined for ‖w‖ < 3π
+OF_SLOW_ENDS = rb.closed_forms.bezier, rb.closed_forms.corrected_bezier  # defined for ‖w‖ < 3π
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
 
 
@@ -89,16 +89,16 @@ def test_no_closed_form_costs_less_than_the_optimum(best, what):
         assert curves.cost[i] == pytest.approx(cost, rel=1e-9)
     ends, every = [R0, R1, w0, w1], np.full(len(R0), True)
     slow = (np.linalg.norm([w0, w1], axis=-1) < 9.42).all(axis=0)
-    forms = rb.CLOSED_FORMS.values()
+    forms = rb.closed_forms.FORMS.values()
     others = [(make, ends, slow if make in OF_SLOW_ENDS else every) for make in forms]
     if what == "jerk":
-        quintics = rb.projected_quintic_so3, rb.exponential_quintic_so3
+        quintics = rb.projected_quintic, rb.closed_forms.exponential_quintic
         others = [(make, [*ends, a0, a1], every) for make in quintics]
     elif what != "ball":
         real = np.linalg.eigvalsh(G) @ [1, 1, -1] > 0
-        of_bodies = (rb.weighted_cubic_so3, real), (rb.normal_cubic_so3, every)
+        of_bodies = (rb.weighted_cubic_so3, real), (rb.closed_forms.normal_cubic, every)
         others += [(make, [*ends, G], those) for make, those in of_bodies]
-        of_balls = COSTS[what](rb.minimum_acceleration_so3(*ends), G)
+        of_balls = COSTS[what](rb.minimum_acceleration(*ends), G)
         assert np.all(of_balls > curves.cost * (1 - 1e-9))
     t = np.linspace(0, 1, 401)
     for make, given, those in others:
@@ -141,7 +141,7 @@ def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
     k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])
     turn, *rates = (x[:, None] * axis for x in (sigma, k0, k1))
-    curve = rb.minimum_acceleration_so3(I3, rb.exp_so3(turn), *rates)
+    curve = rb.minimum_acceleration(I3, rb.exp_so3(turn), *rates)
     angles = sigma + 2 * np.pi * np.arange(-12, 13)[:, None]
     assert np.all(curve.cost < cost_about_an_axis(angles, k0, k1).min(axis=0) + 1e-9 * speed**2)
 
@@ -151,7 +151,7 @@ def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
 def test_optima_near_half_turns_have_no_extra_turn(short_of, speeds):
     """Along the axis, p(t) is a cubic, and σ is the shortest rotation vector."""
     angle, rates = np.pi - short_of, np.outer(speeds, [0, 0, 1])
-    curve = rb.minimum_acceleration_so3(I3, rb.exp_so3([0, 0, angle]), *rates)
+    curve = rb.minimum_acceleration(I3, rb.exp_so3([0, 0, angle]), *rates)
     assert rb.acceleration_cost(curve) <= cost_about_an_axis(angle, *speeds) * (1 + 1e-9)
     assert curve.cost == pytest.approx(rb.acceleration_cost(curve), rel=1e-12)
 
@@ -161,12 +161,12 @@ def test_the_solver_converges_near_half_turns(short_of):
     """From rest to rest the solver returns the geodesic, although the projected cubic jumps."""
     axes = np.array([[0, 0, 1], [0.6, -0.8, 0], [1, 1, 1], [-0.3, 0.2, 0.7], [0.1, -2, 1]])
     R1 = rb.exp_so3((np.pi - short_of) * axes / np.linalg.norm(axes, axis=1, keepdims=True))
-    curves = rb.minimum_acceleration_so3(I3, R1, REST, REST)
+    curves = rb.minimum_acceleration(I3, R1, REST, REST)
     assert np.abs(curves(1) - R1).max() < 1e-11
     assert curves.cost == pytest.approx(np.full(5, 24 * (np.pi - short_of) ** 2), rel=1e-9)
-    tumbling = rb.minimum_acceleration_so3(I3, R1, [1, 2, 3], [-3, 0, 1])
+    tumbling = rb.minimum_acceleration(I3, R1, [1, 2, 3], [-3, 0, 1])
     assert tumbling.residual.max() < 1e-11
-    alone = rb.minimum_acceleration_so3(I3, R1[1], [1, 2, 3], [-3, 0, 1])
+    alone = rb.minimum_acceleration(I3, R1[1], [1, 2, 3], [-3, 0, 1])
     assert np.abs(tumbling[1](TIMES) - alone(TIMES)).max() < 1e-10
 
 
@@ -177,7 +177,7 @@ def test_the_cost_is_continuous_along_a_path_of_goals(seed):
     ends = random_ends(np.random.default_rng(seed), np.pi, 12, 1)[:, 0]
     axis, w0, w1 = ends if seed else vectors(ASTRAY)
     turns = np.linspace(0, 2 * np.pi, 500)[:, None] * axis / np.linalg.norm(axis)
-    cost = rb.minimum_acceleration_so3(I3, rb.exp_so3(turns), w0, w1).cost
+    cost = rb.minimum_acceleration(I3, rb.exp_so3(turns), w0, w1).cost
     steps = np.abs(np.diff(cost))
     assert np.all(steps[1:-1] < 3 * np.maximum(steps[:-2], steps[2:]) + 1e-9 * cost.max())
 
@@ -187,7 +187,7 @@ def test_tiny_motions_cost_as_much_as_their_cubic(power):
     """The squares of these velocities are 0 in floating point. The solver must not add a full
     turn."""
     speed = 10.0**power
-    curve = rb.minimum_acceleration_so3(I3, I3, [0, 0, speed], REST)
+    curve = rb.minimum_acceleration(I3, I3, [0, 0, speed], REST)
     assert curve.cost == pytest.approx(8 * speed**2, rel=1e-4, abs=1e-40)
     assert np.abs(curve(0.5) - I3).max() <= speed
 
@@ -201,7 +201,7 @@ def test_free_motions_cost_nothing(what):
     w = rng.normal(size=(12, 3))
     w *= rng.uniform(3, 16, (12, 1)) / np.linalg.norm(w, axis=1, keepdims=True)
     w, G = (np.vstack([[[0.8, 0.1, 1.2], [1, 2, 0.3]], w]), np.concatenate([few, bodies(12, 17)]))
-    A, rates = rb.geodesic_flow(G, I3, w, [0.0, 0.5, 1.0])
+    A, rates = rb.connection.geodesic_flow(G, I3, w, [0.0, 0.5, 1.0])
     curves = OPTIMA[what](I3, A[2], w, rates[2], G)
     assert np.all(curves.cost < 1e-15)
     slow = curves[:2]
@@ -263,7 +263,7 @@ def test_the_best_quintic_has_the_least_jerk_about_one_axis():
     jerk = [hermite([0 * angles, angles, *w, *a], (t + 1) / 2, 3) for t in x]
     least = np.tensordot(weights, np.square(jerk), axes=1).min(axis=0)
     rates = [x[:, None] * e for x in (*w, *a)]
-    curves = rb.minimum_jerk_so3(I3, rb.exp_so3(angle[:, None] * e), *rates)
+    curves = rb.minimum_jerk(I3, rb.exp_so3(angle[:, None] * e), *rates)
     assert np.all(curves.cost < least * (1 + 1e-9))
     assert curves.cost[200:] == pytest.approx([3405.8885478242787, 13158.112233979306], rel=1e-10)
 
@@ -273,7 +273,7 @@ def test_turns_about_the_largest_moment_may_leave_the_axis(moments):
     """From rest to rest, a large turn about this axis is a saddle of the integral of squared
     torque."""
     exact, near, small = (
-        rb.minimum_torque_so3(I3, rb.exp_so3(turn), REST, REST, np.diag(moments)).cost
+        rb.minimum_torque(I3, rb.exp_so3(turn), REST, REST, np.diag(moments)).cost
         for turn in ([0, 0, 3.1], [1e-4, 2e-4, 3.1], [0, 0, 1.0])
     )
     assert exact < 0.9 * 12 * (moments[2] * 3.1) ** 2
@@ -300,7 +300,7 @@ def test_rounding_does_not_choose_between_two_best_curves(turn, frame):
     G, axis = frame @ BOOK @ frame.T, frame[:, 2]
     goal = rb.exp_so3(np.radians(turn) * axis)
     w = is_the_same_however_rounded(
-        lambda R1: rb.minimum_torque_so3(I3, R1, REST, REST, G), goal, turn, 4
+        lambda R1: rb.minimum_torque(I3, R1, REST, REST, G), goal, turn, 4
     )
     assert np.abs(np.cross(w, axis)).max() > 0.1  # the curve leaves the axis
 

@@ -20,14 +20,14 @@ POSES = rb.pose_from_components(ROTATIONS, RNG.normal(size=(N, 3)))
 TWISTS = RNG.normal(size=(N, 6))
 H = np.diff(TIMES)
 
-WITHOUT_VELOCITIES = [rb.geodesic_so3, rb.projected_line_so3, rb.geodesic_se3, rb.screw_se3]
+WITHOUT_VELOCITIES = [rb.geodesic, rb.projected_line, rb.geodesic, rb.screw]
 WITH_VELOCITIES = [
-    *rb.CLOSED_FORMS.values(),
-    rb.minimum_acceleration_so3,
-    rb.projected_cubic_se3,
-    rb.minimum_acceleration_se3,
+    *rb.closed_forms.FORMS.values(),
+    rb.minimum_acceleration,
+    rb.projected_cubic,
+    rb.minimum_acceleration,
 ]
-LEGS = [*WITHOUT_VELOCITIES, *WITH_VELOCITIES, rb.projected_quintic_so3]
+LEGS = [*WITHOUT_VELOCITIES, *WITH_VELOCITIES, rb.projected_quintic]
 every_leg = pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.__name__)
 both_groups = pytest.mark.parametrize("poses", [ROTATIONS, POSES], ids=["3", "4"])
 V = np.hstack([TWISTS[:, :3], np.einsum("nij,nj->ni", ROTATIONS, TWISTS[:, 3:])])
@@ -48,7 +48,7 @@ def test_a_chain_meets_its_poses(leg, poses):
     given = [TIMES.copy(), poses.copy(), TWISTS[:, : 3 if poses is ROTATIONS else 6].copy()]
     if leg in WITHOUT_VELOCITIES:
         given.pop()
-    if leg is rb.projected_quintic_so3:
+    if leg is rb.projected_quintic:
         given[2] = rb.bessel_velocities(TIMES, poses)
     velocities = given[2].copy() if given[2:] else None
     for array in given:
@@ -63,7 +63,7 @@ def test_a_chain_meets_its_poses(leg, poses):
     assert np.abs(c.jumps(0)).max() < 200 * EPS
     assert c([], 1).shape == (0, 3 * c.size - 6)
     many = RNG.uniform(*c.domain, size=5000)  # these times fill more than one block
-    smooth = {rb.projected_quintic_so3: 2}.get(leg, int(velocities is not None))
+    smooth = {rb.projected_quintic: 2}.get(leg, int(velocities is not None))
     inner = TIMES[1:-1]
     for order in range(3):
         jumps = c(inner, order) - c(np.nextafter(inner, -9), order)
@@ -136,7 +136,7 @@ def test_uneven_time_steps_lose_no_digits(ratio):
     """
     steps = np.array([ratio, 1, ratio, ratio, 1, 1, 1, ratio])
     times = np.append(0, np.cumsum(steps))
-    for leg, smooth in ((rb.projected_cubic_so3, 1), (rb.projected_quintic_so3, 2)):
+    for leg, smooth in ((rb.projected_cubic, 1), (rb.projected_quintic, 2)):
         c = rb.chain(times, POSES, leg=leg)
         assert np.abs(c(times) - POSES).max() < 8 * EPS
         assert np.abs(c.legs.at_own_times(steps) - POSES[1:]).max() < 8 * EPS
@@ -145,7 +145,7 @@ def test_uneven_time_steps_lose_no_digits(ratio):
         for order in range(smooth + 1):
             assert np.abs(c.jumps(order)).max() < 20 * EPS * scales[order]
     times = np.append(0, np.cumsum([1, ratio, 1, ratio, ratio, 1, 1, ratio]))
-    legs = rb.chain(times, ROTATIONS, leg=rb.projected_quintic_so3).legs
+    legs = rb.chain(times, ROTATIONS, leg=rb.projected_quintic).legs
     for i, share in zip(range(N - 1), [1e-9, 0.2, 0.5, 0.8, 1 - 1e-9, 0.3, 0.6, 0.9], strict=True):
         M = oracles.polynomial_through(legs.ends[i], share)
         R = oracles.nearest_rotation(M)
@@ -162,7 +162,7 @@ def test_a_chain_without_velocities_rests_at_its_ends(poses):
     assert np.abs(c(TIMES, 1) - chosen).max() < 400 * EPS
     assert np.abs(c.jumps(2)).max() < 1e-12
     assert not c.velocities[[0, -1]].any()
-    quintic = rb.chain(TIMES, poses, leg=rb.projected_quintic_so3)
+    quintic = rb.chain(TIMES, poses, leg=rb.projected_quintic)
     assert np.abs(quintic(TIMES[1:-1], 2) - c(TIMES[1:-1], 2)).max() < 1e-12
     assert np.abs(quintic(TIMES[[0, -1]], 2)).max() < 1e-12
 
@@ -175,47 +175,47 @@ def test_user_defined_functions_make_legs():
     """
     t = np.linspace(*TIMES[[0, -1]], 50)
     for same, turn in (
-        (rb.projected_quintic_so3, lambda R0, R1, a1, **T: rb.geodesic_so3(R0, R1, **T)),
-        (rb.projected_cubic_so3, lambda R0, R1, w0, **T: rb.geodesic_so3(R0, R1, **T)),
+        (rb.projected_quintic, lambda R0, R1, a1, **T: rb.geodesic(R0, R1, **T)),
+        (rb.projected_cubic, lambda R0, R1, w0, **T: rb.geodesic(R0, R1, **T)),
     ):
         path, want = (rb.chain(TIMES, POSES, leg=leg)(t)[:, :3, 3] for leg in (turn, same))
         assert np.abs(path - want).max() < 1e-13
 
     def slow(R0, R1, duration=1):
         rest = np.zeros(3)
-        return rb.exponential_cubic_so3(R0, R1, rest, rest, duration=duration)
+        return rb.closed_forms.exponential_cubic(R0, R1, rest, rest, duration=duration)
 
     def sliding(A0, A1, duration):
-        turn = rb.geodesic_so3(np.eye(3), np.eye(3), duration=duration)
+        turn = rb.geodesic(np.eye(3), np.eye(3), duration=duration)
         return rigid_motion(RigidMotion, turn, A0[:, :3, 3], A1[:, :3, 3])
 
     c = rb.chain(TIMES, POSES, leg=slow)
     assert np.abs(c(TIMES[:-1], 1)[:, :3]).max() < 20 * EPS  # the rotation rests at each pose
     assert np.abs(c(TIMES[2] + 0.3 * H[2])[:3, :3] - slow(*ROTATIONS[2:4])(0.3)).max() < 40 * EPS
-    frozen = partial(rb.projected_line_so3, f=lambda t, k: [t, 1 + 0 * t][k])
+    frozen = partial(rb.projected_line, f=lambda t, k: [t, 1 + 0 * t][k])
     assert np.abs(rb.chain(TIMES, ROTATIONS, leg=frozen)(TIMES) - ROTATIONS).max() < 20 * EPS
     places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
-    c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic_se3))
+    c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic))
     for order in range(3):
         assert np.abs(c(t, order) - other(t, order)).max() < 1e-12
 
 
 FAR = rb.pose_from_components(ROTATIONS, POSES[:, :3, 3] + [5e5, 5.3e6, 100])
 HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
-TURNS = partial(rb.geodesic_so3, ROTATIONS[:2], ROTATIONS[1:3])
-MOVES = partial(rb.geodesic_se3, POSES[:2], POSES[1:3])
+TURNS = partial(rb.geodesic, ROTATIONS[:2], ROTATIONS[1:3])
+MOVES = partial(rb.geodesic, POSES[:2], POSES[1:3])
 GIVEN = "R0, R1, w0, w1, a0, a1"
 
 
 def turned_by(w):
-    return lambda R0, R1, **T: rb.geodesic_so3(R0, R1 @ rb.exp_so3(w), **T)
+    return lambda R0, R1, **T: rb.geodesic(R0, R1 @ rb.exp_so3(w), **T)
 
 
 @pytest.mark.parametrize(
     ("poses", "leg", "message"),
     [
-        (ROTATIONS, rb.geodesic_se3, f"it needs A0, which is not among {GIVEN}; use functools"),
-        (POSES, rb.minimum_torque_so3, f"it needs inertia, which is not among {GIVEN}, A0"),
+        (ROTATIONS, rb.geodesic, f"it needs A0, which is not among {GIVEN}; use functools"),
+        (POSES, rb.minimum_torque, f"it needs inertia, which is not among {GIVEN}, A0"),
         (ROTATIONS, rb.exp_so3, "it has no parameter duration: <function exp_so3"),
         (ROTATIONS, 3, "a function that makes curves is wanted, got 3"),
         (ROTATIONS, lambda R0, duration: None, "a stack of 2 curves of these durations is wanted"),
@@ -224,7 +224,11 @@ def turned_by(w):
         (FAR, turned_by([0, 0, 2e-6]), "it does not lead from poses[0] to poses[1]"),
         (POSES, lambda A0, **T: TURNS(**T), "curves of shape (4, 4) are wanted, got (3, 3)"),
         (POSES, lambda R0, **T: MOVES(**T), "curves of shape (3, 3) are wanted, got (4, 4)"),
-        (ROTATIONS, lambda w0, **T: rb.bezier_so3(*HALF_TURN, w0 + 9, w0, **T), "w0[0]: a norm"),
+        (
+            ROTATIONS,
+            lambda w0, **T: rb.closed_forms.bezier(*HALF_TURN, w0 + 9, w0, **T),
+            "w0[0]: a norm",
+        ),
     ],
 )
 def test_functions_that_do_not_make_legs_are_refused(poses, leg, message):
@@ -243,9 +247,9 @@ PATHS = [
     (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
 ]
 OF_PATHS = rb.chain, rb.bessel_velocities, rb.spline_velocities
-SCREWS = partial(rb.chain, leg=rb.screw_se3)
+SCREWS = partial(rb.chain, leg=rb.screw)
 LATE = rb.chain([1e9, 2e9], ROTATIONS[:2])
-UNEVEN = rb.retime(rb.geodesic_so3(ROTATIONS[:-1], ROTATIONS[1:]), H)
+UNEVEN = rb.retime(rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]), H)
 
 
 @pytest.mark.parametrize(
@@ -282,13 +286,13 @@ def test_errors_name_the_leg():
     w = np.outer([0, 0, 1, 0], [1e160, 0, 0])  # the optimum is not found
     message = r"^leg: it found no curve from poses\[1\] to poses\[2\] \(NaN\)"
     with pytest.warns(RuntimeWarning), pytest.raises(ValueError, match=message):
-        rb.chain(range(4), ROTATIONS[:4], w, leg=rb.minimum_acceleration_so3)
+        rb.chain(range(4), ROTATIONS[:4], w, leg=rb.minimum_acceleration)
 
 
 @pytest.mark.parametrize("duration", [1e-9, 0.25, 3, 1e12])
 def test_retiming_a_chain_scales_its_times_uniformly(duration):
     c = rb.chain(TIMES, POSES)
-    again, (first, last) = rb.retime(c, duration), c.domain
+    again, (first, last) = c.retimed(duration), c.domain
     start, end = again.domain
     assert (start, end) == (first, first + duration)
     rate = (last - first) / duration
@@ -309,14 +313,14 @@ def test_the_cost_of_a_chain_whose_velocity_jumps_raises_an_error():
     fast."""
 
     def uneven(R0, R1, w0, w1, duration):
-        return rb.projected_cubic_so3(R0, R1, w0 * (1 + 1e-6), w1, duration=duration)
+        return rb.projected_cubic(R0, R1, w0 * (1 + 1e-6), w1, duration=duration)
 
     fast = rb.pose_from_components(ROTATIONS, 1e6 * POSES[:, :3, 3])
-    for poses, leg in ((POSES, rb.geodesic_se3), (fast, uneven)):
+    for poses, leg in ((POSES, rb.geodesic), (fast, uneven)):
         with pytest.raises(RuntimeError, match=r"^acceleration cost: a velocity jumps at a joint"):
             rb.acceleration_cost(rb.chain(TIMES, poses, leg=leg))
-    assert rb.acceleration_cost(rb.chain([0, 9], POSES[:2], leg=rb.geodesic_se3)) == 0
-    stops = rb.chain(TIMES, POSES, 0 * TWISTS, leg=rb.minimum_acceleration_se3)
+    assert rb.acceleration_cost(rb.chain([0, 9], POSES[:2], leg=rb.geodesic)) == 0
+    stops = rb.chain(TIMES, POSES, 0 * TWISTS, leg=rb.minimum_acceleration)
     assert 0 < rb.acceleration_cost(stops) < np.inf
 
 

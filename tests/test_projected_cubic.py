@@ -15,8 +15,8 @@ N = 60
 R0, R1 = (Rotation.random(N, rng=RNG).as_matrix() for _ in range(2))
 W0, W1, B0, B1 = 4 * RNG.normal(size=(4, N, 3))
 TIMES, I3, REST = np.linspace(0, 1, 41), np.eye(3), np.zeros(3)
-CUBICS = rb.projected_cubic_so3(R0, R1, W0, W1)
-QUINTICS = rb.projected_quintic_so3(R0, R1, W0, W1, B0, B1)
+CUBICS = rb.projected_cubic(R0, R1, W0, W1)
+QUINTICS = rb.projected_quintic(R0, R1, W0, W1, B0, B1)
 V0, V1 = R0 @ rb.hat_so3(W0), R1 @ rb.hat_so3(W1)
 PRINTED = [R0, V0, -3 * R0 + 3 * R1 - 2 * V0 - V1, 2 * R0 - 2 * R1 + V0 + V1]
 
@@ -69,7 +69,7 @@ def test_the_quintic_does_not_have_the_least_jerk():
     t = np.linspace(0, 1, 4001)
     for degrees, times in ((20, 1.002), (60, 1.17), (90, 2.31), (120, 11.56)):
         angle = np.radians(degrees)
-        curve = rb.projected_quintic_so3(I3, rb.exp_so3([0, 0, angle]), *[REST] * 4)
+        curve = rb.projected_quintic(I3, rb.exp_so3([0, 0, angle]), *[REST] * 4)
         cost = np.trapezoid(curve(t, 3)[:, 2] ** 2, t)
         assert cost / (720 * angle**2) == pytest.approx(times, rel=2e-3)
 
@@ -78,9 +78,9 @@ def test_the_quintic_does_not_have_the_least_jerk():
 def test_the_cubic_with_the_ends_of_the_projected_line_equals_this_line():
     """The cubic and the quintic are the line times a positive factor ρ(t), which the projection
     ignores."""
-    line = rb.projected_line_so3(R0, R0 @ rb.exp_so3([0.3, -0.4, 1.2]))
+    line = rb.projected_line(R0, R0 @ rb.exp_so3([0.3, -0.4, 1.2]))
     ends = [line(t, order) for order in (0, 1, 2) for t in (0, 1)]
-    for curve in (rb.projected_cubic_so3(*ends[:4]), rb.projected_quintic_so3(*ends)):
+    for curve in (rb.projected_cubic(*ends[:4]), rb.projected_quintic(*ends)):
         for order in (0, 1, 2):
             assert np.abs(curve(TIMES, order) - line(TIMES, order)).max() < 1e-13
 
@@ -105,7 +105,7 @@ def test_a_jump_between_the_sampled_times_is_found(k, k1):
     k0 = np.sqrt(h01**2 + (k1 * h11) ** 2 - h00**2) / h10
     a = np.angle(-(h00 + 1j * k0 * h10) / (h01 + 1j * k1 * h11))
     with pytest.warns(RuntimeWarning, match="jumps there"):
-        curve = rb.projected_cubic_so3(I3, rb.exp_so3([0, 0, a]), [0, 0, k0], [0, 0, k1])
+        curve = rb.projected_cubic(I3, rb.exp_so3([0, 0, a]), [0, 0, k0], [0, 0, k1])
     assert curve.margin < 1e-12
 
 

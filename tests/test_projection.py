@@ -84,16 +84,16 @@ def test_projections_are_invariant():
     is invariant only on the left."""
     rng = np.random.default_rng(3)
     M, L, W = rng.normal(size=(40, 3, 3)), members(3, rng), np.diag([1, 2, 5])
-    R, Q = rb.project_so(M), rb.orthonormalize_gram_schmidt(M)
+    R, Q = rb.project_so(M), rb.projection.orthonormalize_gram_schmidt(M)
     bound = 40 * EPS * condition(M, R)[:, None, None]
     assert np.all(np.abs(rb.project_so(L @ M) - L @ R) < bound)
     assert np.all(np.abs(rb.project_so(M @ L) - R @ L) < bound)
-    assert np.abs(rb.orthonormalize_gram_schmidt(L @ M) - L @ Q).max() < 1e-12
-    assert np.abs(rb.orthonormalize_gram_schmidt(M @ L) - Q @ L).max() > 0.1
-    R = rb.project_so_weighted(M, W)
-    assert np.abs(rb.project_so_weighted(L @ M, W) - L @ R).max() < 1e-12
-    assert np.abs(rb.project_so_weighted(M @ L, L.mT @ W @ L) - R @ L).max() < 1e-12
-    assert np.abs(rb.project_so_weighted(M @ L, W) - R @ L).max() > 0.1
+    assert np.abs(rb.projection.orthonormalize_gram_schmidt(L @ M) - L @ Q).max() < 1e-12
+    assert np.abs(rb.projection.orthonormalize_gram_schmidt(M @ L) - Q @ L).max() > 0.1
+    R = rb.projection.project_so_weighted(M, W)
+    assert np.abs(rb.projection.project_so_weighted(L @ M, W) - L @ R).max() < 1e-12
+    assert np.abs(rb.projection.project_so_weighted(M @ L, L.mT @ W @ L) - R @ L).max() < 1e-12
+    assert np.abs(rb.projection.project_so_weighted(M @ L, W) - R @ L).max() > 0.1
 
 
 @pytest.mark.parametrize("n", [2, 3, 4])
@@ -112,7 +112,7 @@ def test_the_weighted_projection_is_the_nearest_rotation_in_its_metric(n):
     Q = np.linalg.qr(rng.normal(size=(1000, n, n)))[0]
     W, root = Q * sizes[:, None] @ Q.mT, Q * np.sqrt(sizes)[:, None]
     for M in (np.resize(awkward.matrices(n, rng), Q.shape), rng.normal(size=Q.shape)):
-        R = rb.project_so_weighted(M, W)
+        R = rb.projection.project_so_weighted(M, W)
         assert_members(R)
         assert_nearest(R, M, W)
         best = np.sum(((M - R) @ root) ** 2, axis=(-2, -1))
@@ -120,7 +120,7 @@ def test_the_weighted_projection_is_the_nearest_rotation_in_its_metric(n):
         for other in members(n, rng, 100):
             assert np.all(best <= np.sum(((M - other) @ root) ** 2, axis=(-2, -1)) + bound)
     R, lost = members(n, rng, 200), rng.normal(size=(200, n, 1)) @ Q[:200, :, :1].mT
-    assert np.abs(rb.project_so_weighted(R + lost, W[:200]) - R).max() < 200 * n * EPS
+    assert np.abs(rb.projection.project_so_weighted(R + lost, W[:200]) - R).max() < 200 * n * EPS
 
 
 @pytest.mark.parametrize("n", DIMENSIONS)
@@ -131,7 +131,7 @@ def test_gram_schmidt_leaves_an_upper_triangular_matrix(n):
     nearly_flat = members(n, rng) * ([1.0] * (n - 1) + [1e-12]) @ members(n, rng)
     stretched = M * np.geomspace(1e-200, 1e200, n)
     M = np.concatenate([M, nearly_flat, stretched, 1e200 * M, 1e-200 * M])
-    Q = rb.orthonormalize_gram_schmidt(M)
+    Q = rb.projection.orthonormalize_gram_schmidt(M)
     assert np.abs(Q.mT @ Q - np.eye(n)).max() < 8 * n * EPS
     T = Q.mT @ M
     assert np.abs(np.tril(T, -1) / np.abs(M).max(axis=-2, keepdims=True)).max() < 8 * n * EPS
@@ -139,8 +139,8 @@ def test_gram_schmidt_leaves_an_upper_triangular_matrix(n):
 
 
 def test_dependent_columns_are_refused():
-    gram_schmidt, negative = rb.orthonormalize_gram_schmidt, "has a negative eigenvalue"
-    weighted, stack = rb.project_so_weighted, [np.eye(3), -np.eye(3), np.eye(3)]
+    gram_schmidt, negative = rb.projection.orthonormalize_gram_schmidt, "has a negative eigenvalue"
+    weighted, stack = rb.projection.project_so_weighted, [np.eye(3), -np.eye(3), np.eye(3)]
     for function, arguments, message in (
         (gram_schmidt, [np.arange(9).reshape(3, 3)], "M: column 2 depends on the columns before"),
         (gram_schmidt, [np.zeros((1, 1))], "M: column 0 depends"),
@@ -225,7 +225,7 @@ def test_the_projected_pose_is_the_nearest_pose(n):
 
 @pytest.mark.source("RR 1.1", "RR (1)", "RR (2)", "RR 1.2", "RR (3)", "RR 1.3", "BK 2.1")
 def test_membership_tests_allow_defects_up_to_atol():
-    is_so, is_se, is_unit = rb.is_so, rb.is_se, rb.is_unit_quaternion
+    is_so, is_se, is_unit = rb.is_so, rb.is_se, rb.quaternion.is_unit_quaternion
     assert is_so(members(3, np.random.default_rng(0)), 1e-14).all()
     drifted, A = np.eye(3) + 1e-3, rb.pose_from_components(np.eye(3), [1e6, -2, 3])
     for other in (np.diag([1, 1, -1]), np.diag([2, 0.5]), drifted, [[-1]]):
@@ -349,7 +349,7 @@ def test_scaling_by_powers_of_two_does_not_change_any_bit(power):
     for some in (M, *M[:20]):
         assert np.array_equal(rb.project_so(some), rb.project_so(np.ldexp(some, power)))
     M = awkward.matrices(3, np.random.default_rng(3))
-    weighted = rb.project_so_weighted(M, np.ldexp(np.eye(3), power))
+    weighted = rb.projection.project_so_weighted(M, np.ldexp(np.eye(3), power))
     assert np.array_equal(weighted, rb.project_so(M))
     assert_members(rb.project_so(np.full((3, 3), 5e-324)))
 

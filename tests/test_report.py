@@ -142,7 +142,7 @@ def test_random_rotations_agree_with_the_samplers(quaternion):
         assert animation.seconds == pytest.approx(max(4, (steps + 1) / 25))
 
 
-@pytest.mark.parametrize("function", [rb.exp_so3, rb.quaternion_from_rotation_vector])
+@pytest.mark.parametrize("function", [rb.exp_so3, rb.quaternion.quaternion_from_rotation_vector])
 def test_one_rotation_is_shown_step_by_step(function):
     """An argument within the tolerance is replaced by the nearest rotation."""
     turn = np.array([0.5, 1, -2])

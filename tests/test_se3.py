@@ -24,7 +24,7 @@ def test_hat_is_the_printed_matrix():
     assert np.array_equal(X[..., :3, 3], S[..., 3:])
     assert np.all(X[..., 3, :] == 0)
     assert np.array_equal(rb.vee_se3(X), S)
-    assert np.array_equal(np.tensordot(S, rb.BASIS_SE3, 1), X)
+    assert np.array_equal(np.tensordot(S, rb.connection.BASIS_SE3, 1), X)
 
 
 @pytest.mark.source("BK 2.6")

@@ -26,7 +26,7 @@ def test_components_in_the_basis_of_so3_are_the_angular_velocity_only_with_all_h
     """The printed e₂ and e₃ are vectors. Added to a matrix, a vector may mean rows, columns or a
     diagonal."""
     w, e = np.array([0.3, -1.2, 0.8]), np.eye(3)
-    assert np.array_equal(np.tensordot(w, rb.BASIS_SO3, 1), rb.hat_so3(w))
+    assert np.array_equal(np.tensordot(w, rb.connection.BASIS_SO3, 1), rb.hat_so3(w))
     for reading in (lambda v: v[None], lambda v: v[:, None], np.diag):
         printed = w[0] * rb.hat_so3(e[0]) + w[1] * reading(e[1]) + w[2] * reading(e[2])
         assert np.abs(printed - rb.hat_so3(w)).max() > 0.5
@@ -36,7 +36,7 @@ def test_components_in_the_basis_of_so3_are_the_angular_velocity_only_with_all_h
 def test_the_basis_of_so3_spans_no_twist_with_a_linear_velocity():
     """The printed ω̂ in se(3) has components in a basis of se(3), not of so(3)."""
     S = np.array([0.3, -1.2, 0.8, 2, 0, -1.5])
-    turns = rb.BASIS_SE3[:3].reshape(3, 16).T
+    turns = rb.connection.BASIS_SE3[:3].reshape(3, 16).T
     for twist, rest in ((S, np.linalg.norm(S[3:])), (np.append(S[:3], REST), 0)):
         matrix = rb.hat_se3(twist).ravel()
         found, *_ = np.linalg.lstsq(turns, matrix)
@@ -86,10 +86,10 @@ def test_exp_of_huge_vectors_is_a_rotation_until_their_norm_overflows():
         assert np.abs(J - np.outer(n, n)).max() < 8 * EPS + 2 / length
         inverse = rb.right_jacobian_inverse_so3(length / 1e3 * n)
         assert np.abs(inverse @ n - n).max() < 8 * EPS * length
-        q = rb.quaternion_from_rotation_vector(length * n)
+        q = rb.quaternion.quaternion_from_rotation_vector(length * n)
         assert np.abs(np.linalg.norm(q) - 1) < 8 * EPS
     functions = rb.exp_so3, rb.right_jacobian_so3, rb.right_jacobian_inverse_so3, rb.exp_se3
-    for function in (*functions, rb.quaternion_from_rotation_vector):
+    for function in (*functions, rb.quaternion.quaternion_from_rotation_vector):
         w = np.outer([0, 1.7e308], np.ones(6 if function is rb.exp_se3 else 3))
         with pytest.raises(ValueError, match=r"^norm of w\[1\] is inf"):
             function(w)

@@ -18,7 +18,7 @@ def test_the_geodesic_agrees_with_the_textbook():
     for turn in (ALONG, [0, 0, 0], [1e-9, 0, 2e-9], [0, 3.14, 0], [0, 0, np.pi]):
         R0 = Rotation.random(rng=6).as_matrix()
         R1 = R0 @ rb.exp_so3(turn)
-        off = np.abs(rb.geodesic_so3(R0, R1)(TIMES) - textbook.geodesic_so3(R0, R1, TIMES))
+        off = np.abs(rb.geodesic(R0, R1)(TIMES) - textbook.geodesic(R0, R1, TIMES))
         assert off.max() < 8 * EPS
 
 
@@ -28,9 +28,9 @@ def test_the_projected_cubic_agrees_with_the_textbook():
     rng = np.random.default_rng(62)
     for _ in range(15):
         ends = *Rotation.random(2, rng=rng).as_matrix(), *3 * rng.normal(size=(2, 3))
-        curve = rb.projected_cubic_so3(*ends)
+        curve = rb.projected_cubic(*ends)
         size = np.linalg.norm(curve.ends, axis=(-2, -1)).sum() / min(curve.margin, 1)
-        for order, want in enumerate(textbook.projected_cubic_so3(*ends, TIMES)):
+        for order, want in enumerate(textbook.projected_cubic(*ends, TIMES)):
             assert np.abs(curve(TIMES, order) - want).max() < 4 * EPS * size ** (1 + order)
 
 
@@ -40,8 +40,8 @@ def test_the_optima_agree_with_the_textbook(turn, w0, w1):
     R0, body = Rotation.random(rng=19).as_matrix(), np.diag([1, 2.2, 2.9])
     given = R0, R0 @ rb.exp_so3(turn), w0, w1
     for name, ends, bound in (
-        ("minimum_acceleration_so3", given, 1e-9),
-        ("minimum_torque_so3", (*given, body), 1e-8),
+        ("minimum_acceleration", given, 1e-9),
+        ("minimum_torque", (*given, body), 1e-8),
     ):
         curve = getattr(rb, name)(*ends)
         for order, want in enumerate(getattr(textbook, name)(*ends, TIMES)):
@@ -54,7 +54,7 @@ def test_shooting_reaches_the_optimum(case):
     turn, w0, w1 = PAPER[case]
     R0 = Rotation.random(rng=20).as_matrix()
     ends = R0, R0 @ rb.exp_so3(turn), w0, w1
-    best = rb.minimum_acceleration_so3(*ends)
+    best = rb.minimum_acceleration(*ends)
     *found, corrections = textbook.shoot(*ends, TIMES)
     for order, values in enumerate(found):
         assert np.abs(best(TIMES, order) - values).max() < 1e-9
@@ -74,7 +74,7 @@ def test_an_optimum_that_is_not_found_raises_an_error(monkeypatch):
     failed = SimpleNamespace(success=False, message="too many nodes")
     monkeypatch.setattr(integrate, "solve_bvp", lambda *_, **__: failed)
     given, times = (np.eye(3), np.eye(3), np.zeros(3), np.zeros(3)), np.zeros(1)
-    for name, body in (("minimum_acceleration_so3", ()), ("minimum_torque_so3", [np.eye(3)])):
+    for name, body in (("minimum_acceleration", ()), ("minimum_torque", [np.eye(3)])):
         with pytest.raises(RuntimeError, match="too many nodes"):
             getattr(textbook, name)(*given, *body, times)
 

@@ -42,7 +42,7 @@ def moved(*d):
 
 def circle(angle, radius):
     R = rb.exp_so3([0, 0, angle])
-    return rb.screw_se3(moved(radius, 0, 0), rb.pose_from_components(R, R @ [radius, 0, 0]))
+    return rb.screw(moved(radius, 0, 0), rb.pose_from_components(R, R @ [radius, 0, 0]))
 
 
 def trapezoid(length, v, a):
@@ -66,7 +66,7 @@ CORNER = [float(rb.angle_between(R0, R1)) for R0, R1 in pairwise(CORNERS)]
 
 
 def about(axis):
-    return rb.geodesic_so3(np.eye(3), rb.exp_so3(axis))
+    return rb.geodesic(np.eye(3), rb.exp_so3(axis))
 
 
 SPINNING = {"angular_speed": 1, "angular_acceleration": 2}
@@ -74,10 +74,10 @@ MOVING = {"speed": 1, "acceleration": 2}
 FORMULAS = {
     "trapezoid": (about(TURN), SPINNING, trapezoid(ANGLE, 1, 2), 3e-7),
     "bang-bang": (about(TURN), {"angular_acceleration": 2}, 2 * np.sqrt(ANGLE / 2), 1e-12),
-    "line": (rb.geodesic_se3(I4, LINE), MOVING, 3.5, 2e-6),
+    "line": (rb.geodesic(I4, LINE), MOVING, 3.5, 2e-6),
     "line, cubic": (rb.chain([0, 1], [I4, LINE]), MOVING, 3.5, 2e-5),
     "line, quintic": (
-        rb.chain([0, 1], [I4, LINE], leg=rb.projected_quintic_so3),
+        rb.chain([0, 1], [I4, LINE], leg=rb.projected_quintic),
         MOVING,
         3.5,
         5e-4,
@@ -85,7 +85,7 @@ FORMULAS = {
     "long circle": (circle(3, 0.5), {"acceleration": 2}, on_circle(3, 0.5, 2), 3e-4),
     "short circle": (circle(1.2, 0.5), {"acceleration": 2}, on_circle(1.2, 0.5, 2), 3e-4),
     "tool": (
-        rb.geodesic_se3(I4, rb.pose_from_components(rb.exp_so3([0, 0, 3]), REST)),
+        rb.geodesic(I4, rb.pose_from_components(rb.exp_so3([0, 0, 3]), REST)),
         {"acceleration": 2, "centre": (0.3, 0.4, 1)},
         on_circle(3, 0.5, 2),
         3e-4,
@@ -98,19 +98,19 @@ FORMULAS = {
     ),
     "principal axis": (about([0, 2, 0]), {"torque": 1.5, "inertia": G}, np.sqrt(32 / 3), 1e-12),
     "upwards": (
-        rb.geodesic_se3(I4, moved(0, 0, 2)),
+        rb.geodesic(I4, moved(0, 0, 2)),
         {"force": 15, "gravity": (0, 0, -9.81)},
         2 * np.sqrt(1 / (15 - 9.81) + 1 / (15 + 9.81)),
         1e-9,
     ),
     "corner": (
-        rb.chain([0, 1, 3], CORNERS, leg=rb.geodesic_so3),
+        rb.chain([0, 1, 3], CORNERS, leg=rb.geodesic),
         SPINNING,
         sum(trapezoid(angle, 1, 2) for angle in CORNER),
         1e-5,
     ),
     "from 0.5 to 0.8 m/s": (
-        rb.geodesic_se3(I4, LINE),
+        rb.geodesic(I4, LINE),
         MOVING | {"rates": (0.5 / 3, 0.8 / 3)},
         0.35 + 3 - (1 - 0.25) / 4 - (1 - 0.64) / 4,
         2e-6,
@@ -154,7 +154,7 @@ def test_times_with_box_limits_agree_with_toppra():
     for seed, T in enumerate([2.4639600513, 2.8119294681, 1.8797166882]):
         c, rng = random_chain(seed), np.random.default_rng(seed)
         A0, A1 = c(np.array(c.domain))
-        leg = rb.minimum_acceleration_se3(A0, A1, *rng.uniform(-1, 1, (4, 3)))
+        leg = rb.minimum_acceleration(A0, A1, *rng.uniform(-1, 1, (4, 3)))
         limits = {"angular_speed": 1.5, "speed": 1.0}
         limits |= {"angular_acceleration": [4, 3, 5], "acceleration": [3, 4, 2]}
         assert rb.fastest(leg, **limits).domain[1] == pytest.approx(T, rel=1e-5)
@@ -222,7 +222,7 @@ def test_the_least_time_has_the_symmetries_of_the_problem(name):
 
     same = [rb.fastest(rb.chain(t, turned @ poses), **limits)]
     same += [rb.fastest(rb.chain(-t[::-1], poses[::-1]), **limits)]
-    same += [rb.fastest(rb.retime(c, 7.0), **limits)]
+    same += [rb.fastest(c.retimed(7.0), **limits)]
     for unit in (1e-4, 1e6):
         far, theirs = longer(unit)
         same += [rb.fastest(rb.chain(t, far), **theirs)]
@@ -332,7 +332,7 @@ def test_many_stops_cost_what_the_formula_says(legs):
     R = [np.eye(3)]
     for turn in turns:
         R.append(R[-1] @ rb.exp_so3(turn))
-    c = rb.chain(np.arange(legs + 1), R, leg=rb.geodesic_so3)
+    c = rb.chain(np.arange(legs + 1), R, leg=rb.geodesic)
     for speed in (0.05, 0.2, 1):
         timed = rb.fastest(c, angular_speed=speed, angular_acceleration=2)
         assert timed.domain[1] == pytest.approx(legs * trapezoid(0.5, speed, 2), rel=2e-3)
@@ -356,7 +356,7 @@ def test_a_timed_curve_has_exact_derivatives(size):
     if size == 4:
         v = (timed(t)[:, :3, :3].mT @ rate)[..., 0]
         np.testing.assert_allclose(timed(t, 1)[:, 3:], v, atol=1e-9)
-        slow = rb.retime(timed, 3 * timed.domain[1])
+        slow = timed.retimed(3 * timed.domain[1])
         np.testing.assert_allclose(slow(3 * t, 2), timed(t, 2) / 9, rtol=1e-9, atol=1e-12)
         assert rb.fastest(slow, **limits).domain == timed.domain
     before, after = (timed(x, 1) for x in (np.nextafter(timed.times[1:-1], 0), timed.times[1:-1]))
@@ -366,7 +366,7 @@ def test_a_timed_curve_has_exact_derivatives(size):
 
 
 def test_the_first_time_at_a_limit_is_returned():
-    used = rb.limits_used(rb.fastest(rb.geodesic_se3(I4, LINE), **MOVING), **MOVING)
+    used = rb.limits_used(rb.fastest(rb.geodesic(I4, LINE), **MOVING), **MOVING)
     assert used["speed"] == pytest.approx((1, 0.5), abs=5e-3)
 
 
@@ -374,10 +374,10 @@ def test_limits_hold_in_the_cells_next_to_a_rest():
     """In the cells next to a rest, speeds and accelerations are polynomials."""
     line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])
     slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
-    still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic_so3)
+    still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic)
     held = rb.fastest(still, force=12, gravity=(0, 0, -9.81), acceleration=3)
     further = rb.pose_from_coordinates([0.5, 0.3, 1, 2, 0, 0])
-    still = rb.chain([0, 1], [I4, further], leg=rb.projected_quintic_so3)
+    still = rb.chain([0, 1], [I4, further], leg=rb.projected_quintic)
     free = rb.fastest(still, acceleration=3, angular_acceleration=3)
     for timed, order, most in ((slow, 1, 1e-3), (held, 2, 3), (free, 2, 3)):
         t = np.geomspace(1e-8, 0.5, 100_001) * timed.domain[1]
@@ -387,13 +387,13 @@ def test_limits_hold_in_the_cells_next_to_a_rest():
 
 
 def test_a_uniform_motion_at_its_limits_is_not_changed():
-    leg = rb.geodesic_se3(I4, rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2]))
+    leg = rb.geodesic(I4, rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2]))
     w, v = np.linalg.norm(leg(0, 1).reshape(2, 3), axis=1)
     timed = rb.fastest(leg, angular_speed=w, speed=v, acceleration=1, rates=(1, 1))
     assert timed.domain[1] == pytest.approx(1, rel=1e-9)
 
 
-UP = rb.geodesic_se3(I4, moved(0, 0, 2))
+UP = rb.geodesic(I4, moved(0, 0, 2))
 REFUSED = [
     (about(TURN), {}, "limits: none of angular_speed, "),
     (about(TURN), {"angular_speed": 1}, "limits: one of angular_acceleration, "),
@@ -421,9 +421,9 @@ REFUSED = [
         {"force": 9, "gravity": (0, 0, -9.81)},
         "force: 1.09 times the limit is needed to hold the body near s = 0$",
     ),
-    (rb.geodesic_se3(LINE, LINE), MOVING, "curve: the path stands still"),
+    (rb.geodesic(LINE, LINE), MOVING, "curve: the path stands still"),
     (
-        rb.geodesic_so3(np.eye(3), CORNERS),
+        rb.geodesic(np.eye(3), CORNERS),
         SPINNING,
         "curve: a single Curve, not a stack, is wanted",
     ),

@@ -58,7 +58,7 @@ def closed_forms(inertia: ArrayLike | None = None) -> Makers:
     if inertia is None:
         return FORMS
     weighted = partial(rb.weighted_cubic_so3, inertia=inertia)
-    normal = partial(rb.normal_cubic_so3, inertia=inertia)
+    normal = partial(rb.closed_forms.normal_cubic, inertia=inertia)
     return {"projection": FORMS["projection"], "weighted": weighted, **FORMS, "normal": normal}
 
 
@@ -164,7 +164,7 @@ def survey(
 def _survey_chunk(ways: Makers, inertia: ArrayLike | None, chunk: Ends) -> dict[str, Array]:
     # neither a cost of NaN nor a small margin needs a warning
     with threadpool_limits(1), warnings.catch_warnings(category=RuntimeWarning, action="ignore"):
-        found = {"optimum": np.asarray(rb.minimum_acceleration_so3(*chunk, inertia).cost)}
+        found = {"optimum": np.asarray(rb.minimum_acceleration(*chunk, inertia).cost)}
         for name, make in ways.items():
             try:
                 found[name] = costs(make, chunk, inertia)
@@ -222,7 +222,7 @@ def body_excesses(
     """
     # the correction of the corrected Bézier curve is for a ball
     forms = {name: make for name, make in closed_forms(inertia).items() if name != "corrected"}
-    ways: Makers = {"long way": rb.bezier_long_so3, "ball's optimum": rb.minimum_acceleration_so3}
+    ways: Makers = {"long way": rb.bezier_long_so3, "ball's optimum": rb.minimum_acceleration}
     found = survey(ends, executor, inertia=inertia, ways={**forms, **ways}, title=title)
     excess = excesses(ends, found, inertia)
     two = np.fmin(excess["Bézier"], excess["long way"])

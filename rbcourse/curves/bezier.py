@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import first_index
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse._quaternions import quaternion_of
 from rbcourse._taylor import (
@@ -18,101 +19,94 @@ from rbcourse._taylor import (
     times,
 )
 from rbcourse.conversions import quaternion_from_rotation_vector
-from rbcourse.curves.curve import (
-    Ends,
-    QuaternionCurve,
-    identity,
-    other_way,
-)
+from rbcourse.curves.curve import Curve, QuaternionCurve, identity, other_way
+from rbcourse.curves.ends import Ends, Given, between
+from rbcourse.curves.projected import projected_cubic
+from rbcourse.curves.rigid import moving
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import exp_so3, log
 
 Legs = tuple[Array, Array, Array]
 
 
-def bezier_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> Bezier:
+@described_by(projected_cubic)
+def bezier(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    long: bool = False,
+    duration: ArrayLike = 1.0,
+) -> Curve:
     """Return the cubic Bézier curve with these ends, by de Casteljau's algorithm with geodesics.
 
-    Source: BK 1, its references 3 to 5.
+    Source: BK 1, its references 3 to 5; for ``long``, beyond BK 10.
 
     Parameters
     ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`; ‖w0‖ and ‖w1‖ times the duration must be below 3π.
+    start, goal, v0, v1
+        As for `projected_cubic`.
+    long : bool, optional
+        Whether the middle leg turns the other way round. If the end velocities are large, this
+        curve may cost less.
+    duration
+        As for `projected_cubic`.
 
     Returns
     -------
-    Bezier
+    Curve
         A curve with the control points R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1. It meets all four
         boundary conditions.
 
     Notes
     -----
-    Singular set: the two inner control points are a half-turn apart. `log_so3` then chooses the
-    geodesic between them. By the triangle inequality, no other leg can become a half-turn. The
-    curve does not depend on the choice of frames, and the ends R1, R0, −w1, −w0 give the reversed
-    curve.
+    Domain: ‖w0‖ and ‖w1‖ times the duration are below 3π. Singular set: the two inner control
+    points are a half-turn apart. `log_so3` then chooses the geodesic between them. If `long` is
+    True, equal inner control points are also singular; then `long` has no effect. By the triangle
+    inequality, no other leg can become a half-turn. The curve does not depend on the choice of
+    frames, and the ends R1, R0, −w1, −w0 give the reversed curve.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = bezier_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = bezier(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
     >>> c(1, 1).round(12) + 0.0
     array([0., 1., 0.])
-    """
-    return _bezier(*_slow_ends(R0, R1, w0, w1, duration))
-
-
-def bezier_long_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> Bezier:
-    """Return the Bézier curve with these ends whose middle leg turns the other way round.
-
-    If the end velocities are large, this curve may cost less than `bezier_so3`. The singular set
-    and the symmetries are as for `bezier_so3`. Equal inner control points are also singular; both
-    functions then return the same curve.
-    Source: beyond BK 10.
-
-    Parameters
-    ----------
-    R0, R1, w0, w1, duration
-        As for `bezier_so3`.
-
-    Returns
-    -------
-    Bezier
-        A curve with the control points of `bezier_so3`. It meets all four boundary conditions.
-
-    Examples
-    --------
-    >>> from rbcourse import acceleration_cost, exp_so3
+    >>> from rbcourse import acceleration_cost
     >>> ends = np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, -2.4], [0, 0, -2.4]
-    >>> [float(acceleration_cost(c(*ends)).round(1)) for c in (bezier_so3, bezier_long_so3)]
+    >>> [float(acceleration_cost(bezier(*ends, long=k)).round(1)) for k in (False, True)]
     [365.0, 136.3]
     """
-    ends, T, (first, middle, last) = _slow_ends(R0, R1, w0, w1, duration)
-    return _bezier(ends, T, (first, other_way(middle), last))
+    given = between(start, goal, v0, v1, duration=duration)
+    first, middle, last = _slow_legs(given.ends)
+    middle = other_way(middle) if long else middle
+    return moving(given, _bezier(given, (first, middle, last)))
 
 
-def cumulative_bezier_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> CumulativeBezier:
+@described_by(projected_cubic)
+def cumulative_bezier(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    duration: ArrayLike = 1.0,
+) -> Curve:
     """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
 
-    This curve is faster to evaluate than `bezier_so3`.
+    This curve is faster to evaluate than `bezier`.
     Source: BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit
     quaternion curves with simple high order derivatives, SIGGRAPH 1995.
 
     Parameters
     ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`.
+    start, goal, v0, v1, duration
+        As for `projected_cubic`.
 
     Returns
     -------
-    CumulativeBezier
+    Curve
         The curve with v₁ = w0/3, v₃ = w1/3, the shortest turn v₂ from R0 exp(ŵ0/3) to R1
         exp(−ŵ1/3), and β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³. It meets all four boundary
         conditions.
@@ -126,31 +120,38 @@ def cumulative_bezier_so3(
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = cumulative_bezier_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = cumulative_bezier(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
     >>> c(1, 1).round(12) + 0.0
     array([0., 1., 0.])
     """
-    ends, T = Ends(R0, R1, w0, w1).over(duration)
-    halves = np.stack(bezier_legs(ends), axis=-2) / 2
-    return CumulativeBezier(duration=T, start=quaternion_of(ends.R0), controls=halves)
+    given = between(start, goal, v0, v1, duration=duration)
+    halves = np.stack(bezier_legs(given.ends), axis=-2) / 2
+    first = quaternion_of(given.ends.R0)
+    return moving(given, CumulativeBezier(duration=given.duration, start=first, controls=halves))
 
 
-def corrected_bezier_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> CorrectedBezier:
+@described_by(projected_cubic)
+def corrected_bezier(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    duration: ArrayLike = 1.0,
+) -> Curve:
     """Return the Bézier curve minus its leading deviation from the optimum.
 
     Source: beyond BK 10.
 
     Parameters
     ----------
-    R0, R1, w0, w1, duration
-        As for `bezier_so3`.
+    start, goal, v0, v1, duration
+        As for `projected_cubic`.
 
     Returns
     -------
-    CorrectedBezier
-        The curve R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B(t) of `bezier_so3` and δ(t) of
+    Curve
+        The curve R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B(t) of `bezier` and δ(t) of
         `bezier_deviation`. It meets all four boundary conditions.
 
     Notes
@@ -161,25 +162,31 @@ def corrected_bezier_so3(
     relative excess over the optimum is multiplied by about s⁸ (for the other closed forms, by s⁴ or
     s²). The deviation δ is of third order in the excursion. Large end velocities make δ large, and
     the curve may then cost more than the Bézier curve (see docs/near_optimal.md). The singular set
-    and the symmetries are as for `bezier_so3`. Ends are also singular if two logarithms are equally
+    and the symmetries are as for `bezier`. Ends are also singular if two logarithms are equally
     near to this sum.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = corrected_bezier_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = corrected_bezier(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
     >>> c(1, 1).round(12) + 0.0
     array([0., 1., 0.])
     """
-    ends, T, legs = _slow_ends(R0, R1, w0, w1, duration)
-    curve = _bezier(ends, T, legs)
+    given = between(start, goal, v0, v1, duration=duration)
+    return moving(given, corrected(given))
+
+
+def corrected(given: Given) -> CorrectedBezier:
+    """Return the rotation of `corrected_bezier` for checked boundary conditions."""
+    ends, legs = given.ends, _slow_legs(given.ends)
+    curve = _bezier(given, legs)
     sigma = nearest_turn(log(ends.turn), legs[0] + legs[1] + legs[2])
     deviation = bezier_deviation(sigma, *seen_from_the_middle(sigma, ends.w0, ends.w1))
     middle = quaternion_from_rotation_vector(sigma / 2)
     points = quaternion_multiply(quaternion_conjugate(middle)[..., None, :], curve.controls)
     pure = [np.concatenate([np.zeros_like(c[..., :1]), c], axis=-1) for c in deviation]
     return CorrectedBezier(
-        duration=T,
+        duration=given.duration,
         start=quaternion_multiply(curve.start, middle),
         controls=np.concatenate([points, np.stack(pure, axis=-2)], axis=-2),
     )
@@ -191,19 +198,17 @@ def bezier_legs(ends: Ends) -> Legs:
     return first, log(exp_so3(-first) @ ends.turn @ exp_so3(-last)), last
 
 
-def _slow_ends(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, duration: ArrayLike
-) -> tuple[Ends, Array, Legs]:
-    """Return the ends (rescaled to unit time), the duration, and the legs of the Bézier curve."""
-    ends, T = Ends(R0, R1, w0, w1).over(duration)
-    for name, w in (("w0", ends.w0), ("w1", ends.w1)):
+def _slow_legs(ends: Ends) -> Legs:
+    """Return the legs of the Bézier curve; refuse velocities of 3π or more."""
+    for name, w in (("v0", ends.w0), ("v1", ends.w1)):
         angle = np.linalg.norm(w, axis=-1)
         fast = angle >= 3 * np.pi
         if fast.any():
             raise ValueError(
-                f"{first_index(name, fast)}: a norm below 3π is wanted, got {angle[fast][0]:.4g}"
+                f"{first_index(name, fast)}: an angle ‖w‖ · duration below 3π is wanted, "
+                f"got {angle[fast][0]:.4g}"
             )
-    return ends, T, bezier_legs(ends)
+    return bezier_legs(ends)
 
 
 def seen_from_the_middle(sigma: Array, w0: Array, w1: Array) -> tuple[Array, Array]:
@@ -247,7 +252,7 @@ def nearest_turn(turn: Array, way: Array) -> Array:
 
 
 class CumulativeBezier(QuaternionCurve):
-    """The `Curve` of `cumulative_bezier_so3`."""
+    """The `Curve` of `cumulative_bezier`."""
 
     def quaternion(self, controls: Array, t: Array, order: int) -> Jet:
         """Return the product of exp(βᵢ vᵢ/2)."""
@@ -276,11 +281,12 @@ class Bezier(QuaternionCurve):
         return points[0]
 
 
-def _bezier(ends: Ends, T: Array, legs: Legs) -> Bezier:
-    points = [np.broadcast_to(np.eye(4)[0], (*T.shape, 4))]
+def _bezier(given: Given, legs: Legs) -> Bezier:
+    points = [np.broadcast_to(np.eye(4)[0], (*given.duration.shape, 4))]
     for leg in legs:
         points.append(quaternion_multiply(points[-1], quaternion_from_rotation_vector(leg)))
-    return Bezier(duration=T, start=quaternion_of(ends.R0), controls=np.stack(points, axis=-2))
+    controls = np.stack(points, axis=-2)
+    return Bezier(duration=given.duration, start=quaternion_of(given.ends.R0), controls=controls)
 
 
 class CorrectedBezier(Bezier):

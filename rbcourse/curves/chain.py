@@ -8,33 +8,36 @@ from __future__ import annotations
 
 import math
 import warnings
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from inspect import Parameter, signature
-from operator import index
+from functools import cached_property, partial
+from inspect import signature
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._numerics import BLOCK, EPS, Array, blocks, matvec
-from rbcourse._valid import as_poses, as_rotations
-from rbcourse.curves.closed import quaternion_cubic_so3
-from rbcourse.curves.curve import Curve, SingularTime
-from rbcourse.curves.projected_polynomial import projected_cubic_so3, weighted_cubic_so3
-from rbcourse.curves.rigid import RigidMotion, projected_cubic_se3, rigid_motion
+from rbcourse._checks import as_single
+from rbcourse._docs import described_by
+from rbcourse._numerics import BLOCK, EPS, Array, blocks
+from rbcourse.body import Body
+from rbcourse.curves.closed import quaternion_cubic
+from rbcourse.curves.curve import Curve, Order, SingularTime, moved_rates
+from rbcourse.curves.ends import as_body
+from rbcourse.curves.projected import projected_cubic
+from rbcourse.curves.rigid import Joined, Position
 from rbcourse.curves.velocities import (
     PathEnds,
     as_ends,
     checked_path,
+    cubic_velocities,
+    path_velocities,
     quaternion_system,
-    resting_spline,
     spline_velocities,
 )
 
 Leg = Callable[..., Curve]
-RestAt = Sequence[int] | NDArray[np.integer] | Literal["repeated"]
 
 _ARRIVED = 1e-6
 
@@ -43,33 +46,32 @@ def chain(
     times: ArrayLike,
     poses: ArrayLike,
     velocities: ArrayLike | None = None,
+    accelerations: ArrayLike | None = None,
     *,
     leg: Leg | None = None,
-    rest_at: RestAt = (),
 ) -> Chain:
-    """Return a curve through poses at given times, by default at rest at both ends.
+    """Return a curve of legs that join poses with given velocities.
 
+    `projected_spline` and the other splines choose the velocities.
     Source: BK 6, BK 6.3.
 
     Parameters
     ----------
-    times, poses
-        As for `bessel_velocities`.
-    velocities : array_like, shape (N, 6) or (N, 3), optional
-        Twists or angular velocities at the poses. The default is the `spline_velocities`, with
-        velocity 0 at both ends and at the poses `rest_at`.
+    times : array_like, shape (N,)
+        Two or more increasing times.
+    poses : array_like, shape (N, 3, 3) or (N, 4, 4)
+        A rotation matrix or a pose for each of the times.
+    velocities : array_like, shape (N, 3) or (N, 6), optional
+        Angular velocities or twists (ω, v) at the poses, in the body frame. They are required
+        unless `leg` is given.
+    accelerations : array_like, shape (N, 3) or (N, 6), optional
+        Accelerations at the poses as ``c(t, 2)`` returns them, for quintic legs.
     leg : callable, optional
         A function, from this package or your own, that makes the legs. It returns a stack of
-        two-point curves, and is called once for all legs. Its arguments are the keyword
-        ``duration`` and some of R0, R1, A0, A1, w0, w1, d0_dot, d1_dot, a0, a1 (d0_dot and d1_dot
-        in the fixed frame). A function for rotations can also join poses: the origin then moves on
-        the polynomial with the same number of boundary conditions. The default is
-        `projected_cubic_so3`, or for poses `projected_cubic_se3`.
-    rest_at : sequence of int or "repeated", optional
-        The indices of inner poses at which the curve rests. "repeated" means all poses that equal
-        the previous or the next pose, as during a pause of a recording; the curve then stands still
-        between them. Otherwise, a repeated pose is an ordinary pose: the curve leaves it and
-        returns.
+        two-point curves, and is called once for all legs, as ``leg(start, goal, v0, v1, a0, a1,
+        duration=...)``, without v0 and v1 (and a0 and a1) if no `velocities` (`accelerations`) are
+        given. The default is `projected_cubic`. Without velocities, legs such as those of
+        `geodesic` meet at corners, and legs such as those of `projected_cubic` rest at all poses.
 
     Returns
     -------
@@ -80,125 +82,99 @@ def chain(
     Raises
     ------
     ValueError
-        As for `bessel_velocities`. Also if both `velocities` and `rest_at` are given, if one of
-        them is given but `leg` takes no velocities, or if `leg` needs other arguments, raises
-        ValueError, or misses the next pose by more than 1e-6. The message names the first such
-        place. Warnings and other errors are those of `leg`.
+        Also if `leg` does not take these arguments, raises ValueError, or misses the next pose by
+        more than 1e-6. The message names the first such place. Warnings and other errors are those
+        of `leg`.
 
     Notes
     -----
-    With `geodesic_so3`, `geodesic_se3`, `screw_se3` and `projected_line_so3`, a chain is C⁰ at the
-    joints (the velocity jumps). With the default legs and velocities, it is C², except at inner
-    poses where it rests. It is also C² with `projected_quintic_so3`, `exponential_quintic_so3` and
-    `minimum_jerk_so3`. All other legs take velocities, and the chain is C¹: the acceleration jumps,
-    unless the velocities belong to a spline of these legs (`quaternion_spline_so3`). At the joints
-    of projected legs, velocities agree to a few eps of the largest ‖w‖, and accelerations to a few
-    eps of ‖w‖² + ‖w'‖.
-    The accelerations a0, a1 are 0 at both ends and where the curve rests. At other poses they are
-    those of the default chain, even if velocities are given.
-    A chain at rest at both ends costs more than one with natural ends (`projected_spline_se3`).
-    Compared with `minimum_acceleration_spline_se3` for the same ends, the rotation of a chain costs
-    0.3 %, 5 % or 33 % more if each leg turns by 30°, 60° or 90°. For `quaternion_spline_so3`, these
-    figures are 0.02 %, 0.4 % and 2 %.
+    A chain of cubic legs is C¹: the acceleration jumps, unless the velocities belong to a spline of
+    these legs. A chain of quintic legs is C². At the joints of projected legs, velocities agree to
+    a few eps of the largest ‖w‖, and accelerations to a few eps of ‖w‖² + ‖w'‖.
     Singular set: that of the legs. Half-turns between successive poses raise ValueError. For a
     larger turn, insert a pose.
 
     Examples
     --------
-    >>> from rbcourse import pose_from_coordinates
+    >>> from rbcourse import geodesic, pose_from_coordinates
     >>> poses = pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 2, 0, 0], [0, 0, 2, 2, 2, 0]])
-    >>> c = chain([0, 2, 3], poses)
-    >>> c(2)[:3, 3].round(12), c([0, 2, 3], 1)[:, 2].round(3) + 0.0
-    (array([2., 0., 0.]), array([0.   , 1.052, 0.   ]))
+    >>> c = chain([0, 2, 3], poses, leg=geodesic)
+    >>> c(2)[:3, 3].round(12), c.jumps(1)[0, 3:].round(3)  # the velocity jumps
+    (array([2., 0., 0.]), array([1.143, 1.922, 0.   ]))
     """
     times, poses, velocities = checked_path(times, poses, velocities)
-    moves = poses.shape[-1] == 4
-    if leg is None:
-        leg = projected_cubic_se3 if moves else projected_cubic_so3
-    wanted = _arguments(leg)
-    if velocities is not None and "w0" not in wanted:
-        raise ValueError("velocities: the legs take none")
-    rests = _rests(rest_at, poses)
-    if rests[1:-1].any() and velocities is not None:
-        raise ValueError("rest_at: the velocities are given; set them to 0 at rests")
-    if rests[1:-1].any() and "w0" not in wanted:
-        raise ValueError("rest_at: the legs take no velocities")
-    own, bends = resting_spline(times, poses, rests)
-    if velocities is None and "w0" in wanted:
-        velocities = own
-    twists = own if velocities is None else velocities
-    d_dot, d_bend = (_rotated(poses, x[:, 3:]) for x in (twists, bends))
-    ends = _ends("R{}", poses[:, :3, :3]) | _ends("w{}", twists[:, :3]) | _ends("a{}", bends[:, :3])
-    if moves:
-        ends |= _ends("A{}", poses) | _ends("d{}_dot", d_dot)
-    unknown = [name for name in wanted if name not in ends]
-    if unknown:
-        bound = f"functools.partial(leg, {unknown[0]}=...)"
+    if velocities is None and leg is None:
         raise ValueError(
-            f"leg: it needs {unknown[0]}, which is not among {', '.join(ends)}; use {bound}"
+            "velocities: one for each pose is wanted; projected_spline(times, poses) chooses them"
         )
-    legs = _made(leg, {name: ends[name] for name in wanted}, np.diff(times))
-    if moves and "A0" not in wanted:
-        order = max(("Rwa".index(name[0]) for name in wanted), default=0)  # highest given order
-        path = [poses[:, :3, 3], d_dot, d_bend][: 1 + order]
-        legs = rigid_motion(RigidMotion, legs, *(x for pair in path for x in (pair[:-1], pair[1:])))
-    _check_arrival(legs, poses)
-    return Chain(
-        duration=np.array(times[-1] - times[0]), times=times, legs=legs, velocities=velocities
-    )
+    rates = [] if velocities is None else [velocities]
+    if accelerations is not None:
+        if velocities is None:
+            raise ValueError("accelerations: not without velocities")
+        rates.append(_as_accelerations(accelerations, velocities.shape))
+    return _chain(leg or projected_cubic, times, poses, *rates)
 
 
-def projected_spline_so3(
+@described_by(spline_velocities)
+def projected_spline(
     times: ArrayLike,
-    rotations: ArrayLike,
+    poses: ArrayLike,
     ends: PathEnds = "natural",
-    inertia: ArrayLike | None = None,
+    *,
+    rest_at: Sequence[int] | NDArray[np.integer] = (),
+    body: Body | None = None,
 ) -> Chain:
-    """Return a twice differentiable chain of BK's projected cubics through many rotations.
+    """Return a twice differentiable chain of BK's projected cubics through rotations or poses.
 
-    Source: BK Prop. 3; beyond BK 13, beyond BK 14.
+    Source: BK Prop. 3, BK 6.3; beyond BK 13, beyond BK 14.
 
     Parameters
     ----------
-    times, ends, inertia
+    times, poses, ends, rest_at, body
         As for `spline_velocities`.
-    rotations : array_like, shape (N, 3, 3)
-        Two or more rotations.
 
     Returns
     -------
     Chain
-        A chain of `projected_cubic_so3` (`weighted_cubic_so3` if an inertia is given) with the
-        `spline_velocities`.
+        A chain of `projected_cubic` with the `spline_velocities`. For poses, the centre of mass
+        moves on a cubic spline.
 
     Notes
     -----
-    For two rotations and given velocities, the result is the projected cubic. If the rotations are
-    moved, the spline moves with them; if the times are reversed, the spline is reversed. Its
-    relative excess over the optimum (`minimum_acceleration_spline_so3`) is about 0.05 θ⁴, where θ
-    is the angle of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
-    `quaternion_spline_so3` is 16 times smaller. For three rotations by 0, θ, 0 about one axis, at
-    equally spaced times and with natural ends, the excess is 20711/180180 θ⁴.
+    The acceleration is continuous, except at poses of `rest_at`. For two rotations and given
+    velocities, the result is the projected cubic. If the poses are moved, the spline moves with
+    them; if the times are reversed, the spline is reversed. For rotations with natural ends, its
+    relative excess over the optimum (`minimum_acceleration_spline`) is about 0.05 θ⁴, where θ is
+    the angle of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
+    `quaternion_spline` is 16 times smaller. For three rotations by 0, θ, 0 about one axis, at
+    equally spaced times and with natural ends, the excess is 20711/180180 θ⁴. A spline at rest at
+    both ends costs more than one with natural ends.
     Singular set: that of the legs.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = projected_spline_so3([0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]))
+    >>> c = projected_spline([0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]))
     >>> c.jumps(2).round(12) + 0.0, c([0, 3], 2).round(12) + 0.0
     (array([[0., 0., 0.]]), array([[0., 0., 0.],
            [0., 0., 0.]]))
     """
-    rotations = as_rotations("rotations", rotations)
-    w = spline_velocities(times, rotations, ends, inertia)
-    leg = projected_cubic_so3 if inertia is None else partial(weighted_cubic_so3, inertia=inertia)
-    return chain(times, rotations, w, leg=leg)
+    times, poses, _ = checked_path(times, poses)
+    body, size = as_body(body), 3 * poses.shape[-1] - 6
+    w = cubic_velocities(times, poses, as_ends(ends, len(poses), size, rest_at), body)
+    return _chain(partial(projected_cubic, body=body), times, poses, w)
 
 
-def projected_spline_se3(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natural") -> Chain:
-    """Return a twice differentiable chain of BK's projected motions through many poses.
+@described_by(spline_velocities)
+def quaternion_spline(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natural") -> Chain:
+    """Return a twice differentiable chain of normalised quaternion cubics.
 
-    Source: BK 6.3; beyond BK 13.
+    Among the closed forms of this package, this spline is the nearest to the optimum
+    (`minimum_acceleration_spline`). Its relative excess for rotations is about 0.003 θ⁴, where θ is
+    the angle of a leg in rad. A leg of duration h turns the short way if h ‖ω‖ is below 8 at both
+    ends. If the poses are moved, the spline moves with them; if the times are reversed, the spline
+    is reversed. Singular set: that of the legs.
+    Source: beyond BK 13, beyond BK 14.
 
     Parameters
     ----------
@@ -208,54 +184,85 @@ def projected_spline_se3(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "n
     Returns
     -------
     Chain
-        A chain of `projected_cubic_se3` with the `spline_velocities`. The rotation is
-        `projected_spline_so3`, and the origin moves on a cubic spline.
-
-    Examples
-    --------
-    >>> from rbcourse import pose_from_coordinates
-    >>> poses = pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 2, 0, 0], [0, 0, 2, 2, 2, 0]])
-    >>> c = projected_spline_se3([0, 2, 3], poses)
-    >>> c(2)[:3, 3].round(12), c.jumps(2).round(12) + 0.0
-    (array([2., 0., 0.]), array([[0., 0., 0., 0., 0., 0.]]))
-    """
-    poses = as_poses("poses", poses)
-    return chain(times, poses, spline_velocities(times, poses, ends))
-
-
-def quaternion_spline_so3(
-    times: ArrayLike, rotations: ArrayLike, ends: PathEnds = "natural"
-) -> Chain:
-    """Return a twice differentiable chain of normalised quaternion cubics through many rotations.
-
-    Among the closed forms of this package, this spline is the nearest to the optimum
-    (`minimum_acceleration_spline_so3`). Its relative excess is about 0.003 θ⁴, where θ is the angle
-    of a leg in rad. A leg of duration h turns the short way if h ‖ω‖ is below 8 at both ends. If
-    the rotations are moved, the spline moves with them; if the times are reversed, the spline is
-    reversed. Singular set: that of the legs.
-    Source: beyond BK 13, beyond BK 14.
-
-    Parameters
-    ----------
-    times, rotations, ends
-        As for `projected_spline_so3`.
-
-    Returns
-    -------
-    Chain
-        A chain of `quaternion_cubic_so3`. Its velocities, which make the acceleration continuous,
-        solve a linear system that is positive definite for all rotations.
+        A chain of `closed_forms.quaternion_cubic`. Its velocities, which make the acceleration
+        continuous, solve a linear system that is positive definite for all rotations. For poses,
+        the origin moves on a cubic spline.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = quaternion_spline_so3([0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]))
+    >>> c = quaternion_spline([0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]))
     >>> c.jumps(2).round(12) + 0.0
     array([[0., 0., 0.]])
     """
-    times, rotations, _ = checked_path(times, as_rotations("rotations", rotations))
-    w = quaternion_system(np.diff(times), rotations).solve(as_ends(ends, len(rotations), 3))
-    return chain(times, rotations, w, leg=quaternion_cubic_so3)
+    times, poses, _ = checked_path(times, poses)
+    conditions = as_ends(ends, len(poses), 3 * poses.shape[-1] - 6)
+    h, turning = np.diff(times), conditions._replace(given=conditions.given[:, :3])
+    V = quaternion_system(h, poses[:, :3, :3]).solve(turning)
+    if poses.shape[-1] == 4:
+        V = np.append(V, path_velocities(h, poses, V, conditions, np.zeros(3)), axis=1)
+    return _chain(quaternion_cubic, times, poses, V)
+
+
+def joined(rotation: Curve, position: Position) -> Curve:
+    """Return the motion of poses with a given rotation and a given path of the origin.
+
+    Parameters
+    ----------
+    rotation : Curve
+        A single curve on SO(3); a `chain` gives a chain.
+    position : callable
+        ``position(t, order)`` returns the position of the origin in the fixed frame, in m, or its
+        derivative of order 1 or 2, shape (N, 3), at times t, shape (N,), in the domain of
+        `rotation`. SciPy's ``CubicSpline`` and ``make_interp_spline`` are such callables; their
+        knots may differ from those of the rotation.
+
+    Returns
+    -------
+    Curve
+        A curve on SE(3) with the duration and the body of the rotation.
+
+    Raises
+    ------
+    ValueError
+        If an argument is not of this kind, or, at a call, if `position` returns another shape or a
+        number that is not finite.
+
+    Examples
+    --------
+    >>> from scipy.interpolate import CubicSpline
+    >>> from rbcourse import exp_so3, geodesic
+    >>> turn = geodesic(np.eye(3), exp_so3([0, 0, 1.5]), duration=2)
+    >>> c = joined(turn, CubicSpline([0, 0.5, 2], [[0, 0, 0], [1, 0, 0], [1, 1, 0]]))
+    >>> c(0.5)[:3, 3].round(12), c(0.5, 1)[:3].round(12)
+    (array([1., 0., 0.]), array([0.  , 0.  , 0.75]))
+    """
+    if not isinstance(rotation, Curve) or rotation.size != 3 or rotation.batch_shape:
+        raise ValueError(f"rotation: a single curve on SO(3) is wanted, got {rotation!r}")
+    if not callable(position):
+        raise ValueError(f"position: a callable position(t, order) is wanted, got {position!r}")
+    if not isinstance(rotation, Chain):
+        return _joined(rotation, position, np.array(rotation.domain[0]))
+    legs = _joined(rotation.legs, position, rotation.times[:-1])
+    chain = Chain(
+        duration=rotation.duration,
+        body=rotation.body,
+        times=rotation.times,
+        legs=legs,
+        velocities=None,
+    )
+    return replace(chain, velocities=chain(chain.times, 1))
+
+
+def _joined(rotation: Curve, position: Position, first: Array) -> Joined:
+    return Joined(
+        duration=rotation.duration,
+        body=rotation.body,
+        rotation=rotation,
+        position=position,
+        first=first,
+        span=rotation.duration,
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -281,7 +288,7 @@ class Chain(Curve):
         """The size of the curve's matrices: 3 on SO(3), 4 on SE(3)."""
         return self.legs.size
 
-    @property
+    @cached_property
     def domain(self) -> tuple[float, float]:
         """The first and the last time."""
         return float(self.times[0]), float(self.times[-1])
@@ -314,13 +321,19 @@ class Chain(Curve):
             velocities=None if self.velocities is None else self.velocities / share,
         )
 
-    def jumps(self, order: int) -> Array:
+    def _moved(self, L: Array, X: Array) -> Chain:
+        velocities, legs = self.velocities, self.legs._moved(L, X)
+        if velocities is not None:
+            [velocities] = moved_rates(X, velocities)
+        return replace(self, body=legs.body, legs=legs, velocities=velocities)
+
+    def jumps(self, order: Order) -> Array:
         """Return the jumps of the curve, or of a derivative, at the N − 2 inner poses.
 
         A jump is the value after a pose minus the value before it; `order` is from 0 to 3, or from
         0 to 2 on SE(3).
         """
-        starts, ends = _at_ends(self.legs, self.legs._check_order(order))
+        starts, ends = _at_ends(self.legs, order)
         return starts[1:] - ends[:-1]
 
     def evaluate(self, t: Array, order: int) -> Array:
@@ -336,17 +349,37 @@ class Chain(Curve):
         try:
             return evaluate_legs(self.legs, own, shares, order)[:, None]
         except SingularTime as error:
-            i = error.curve
-            after = error.time * self.legs.duration[i]
-            raise ValueError(
-                f"leg {i}, from {self.times[i]} to {self.times[i + 1]}, {after} after its "
-                f"start: {error.reason}"
-            ) from error
+            raise self._lost(error) from error
 
-    def check_smooth(self, name: str, order: int) -> None:
+    def _once(self, t: float, orders: tuple[int, ...]) -> list[Array]:
+        """Return derivatives at one time."""
+        times = self._times
+        i = bisect_right(times, t, 1, len(times) - 1) - 1
+        h = times[i + 1] - times[i]
+        try:
+            values = self.legs.single(i, min((t - times[i]) / h, 1.0), orders)
+        except SingularTime as error:
+            raise self._lost(error) from error
+        return [x / h**k if k else x for x, k in zip(values, orders, strict=True)]
+
+    @cached_property
+    def _times(self) -> list[float]:
+        times: list[float] = self.times.tolist()
+        return times
+
+    def _lost(self, error: SingularTime) -> ValueError:
+        i = error.curve
+        after = error.time * self.legs.duration[i]
+        return ValueError(
+            f"leg {i}, from {self.times[i]} to {self.times[i + 1]}, {after} after its start: "
+            f"{error.reason}"
+        )
+
+    def check_smooth(self, name: str, order: Literal[1, 2]) -> None:
         """Raise a RuntimeError that begins with `name` if a derivative up to `order` jumps."""
         moments = np.append(self.times, self.times[:-1] + self.legs.duration / 2)
-        for k, what in ((1, "a velocity"), (2, "an acceleration"))[:order]:
+        checked: tuple[tuple[Literal[1, 2], str], ...] = (1, "a velocity"), (2, "an acceleration")
+        for k, what in checked[:order]:
             jumps, sizes = np.abs(self.jumps(k)), np.abs(self(moments, k))
             if k == 2:
                 sizes = sizes + np.abs(self(moments, 1)).max(axis=0) / self.legs.duration.min()
@@ -393,7 +426,7 @@ def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.
     return run, np.minimum(first[:, None] + np.arange(length), ends[run, None] - 1)
 
 
-def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
+def smooth_parts(curve: Curve, name: str, order: Literal[1, 2]) -> Curve:
     """Return the curve, or the legs of a chain that passes `Chain.check_smooth`."""
     if isinstance(curve, Chain):
         curve.check_smooth(name, order)
@@ -401,36 +434,42 @@ def smooth_parts(curve: Curve, name: str, order: int) -> Curve:
     return curve
 
 
-def _at_ends(legs: Curve, order: int) -> Array:
+def _at_ends(legs: Curve, order: Order) -> Array:
     return legs.at_own_times(np.stack([0 * legs.duration, legs.duration]), order)
 
 
-def _ends(name: str, values: Array) -> dict[str, Array]:
-    return {name.format(0): values[:-1], name.format(1): values[1:]}
+def _chain(leg: Leg, times: Array, poses: Array, *rates: Array) -> Chain:
+    """Return the chain of legs between checked poses, with velocities (and accelerations)."""
+    ends = [x for values in (poses, *rates) for x in (values[:-1], values[1:])]
+    legs = _made(leg, ends, np.diff(times))
+    _check_arrival(legs, poses)
+    if legs.body.batch_shape:
+        raise ValueError("leg: the same body for all legs is wanted")
+    return Chain(
+        duration=np.array(times[-1] - times[0]),
+        body=legs.body,
+        times=times,
+        legs=legs,
+        velocities=rates[0] if rates else None,
+    )
 
 
-def _arguments(leg: Leg) -> list[str]:
-    """Return the names of the required arguments of a leg, except the duration."""
+def _made(leg: Leg, ends: list[Array], duration: Array) -> Curve:
     try:
-        parameters = signature(leg).parameters
+        signature(leg).bind(*ends, duration=duration)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"leg: a function that makes curves is wanted, got {leg!r}") from error
-    named = [one for one in parameters.values() if one.kind != Parameter.VAR_KEYWORD]
-    if "duration" not in parameters and len(named) == len(parameters):
-        raise ValueError(f"leg: it has no parameter duration: {leg!r}")
-    needed = [one.name for one in named if one.default is Parameter.empty]
-    return [name for name in needed if name != "duration"]
-
-
-def _made(leg: Leg, ends: dict[str, Array], duration: Array) -> Curve:
+        names = ", ".join(("start", "goal", "v0", "v1", "a0", "a1")[: len(ends)])
+        raise ValueError(
+            f"leg: a function that takes {names} and the keyword duration is wanted ({error})"
+        ) from error
     with warnings.catch_warnings(record=True, action="always") as warned:
         try:
-            legs = leg(**ends, duration=duration)
+            legs = leg(*ends, duration=duration)
         except ValueError as error:
             raise ValueError(f"leg: {error}") from error
     for warning in warned:
-        warnings.warn(warning.message, stacklevel=3)
-    count, size = len(duration), 4 if "A0" in ends else 3
+        warnings.warn(warning.message, stacklevel=4)
+    count, size = len(duration), ends[0].shape[-1]
     if not isinstance(legs, Curve) or not np.array_equal(legs.duration, duration):
         raise ValueError(
             f"leg: a stack of {count} curves of these durations is wanted, got {legs!r}"
@@ -453,24 +492,8 @@ def _check_arrival(legs: Curve, poses: Array) -> None:
         raise ValueError(f"leg: it does not lead from poses[{i}] to poses[{i + 1}]")
 
 
-def _rests(rest_at: RestAt, poses: Array) -> NDArray[np.bool_]:
-    """Return the poses at which a chain rests, shape (N,): both ends, and those of `rest_at`."""
-    rests = np.zeros(len(poses), bool)
-    rests[[0, -1]] = True
-    if isinstance(rest_at, str):
-        if rest_at != "repeated":
-            raise ValueError(f"rest_at: indices or 'repeated' is wanted, got {rest_at!r}")
-        same = (poses[1:] == poses[:-1]).all(axis=(1, 2))
-        return rests | np.append(same, False) | np.append(False, same)
-    try:
-        rests[[index(i) for i in rest_at]] = True
-    except (TypeError, IndexError) as error:
-        raise ValueError(
-            f"rest_at: indices of the {len(poses)} poses are wanted, got {rest_at!r}"
-        ) from error
-    return rests
-
-
-def _rotated(poses: Array, v: Array) -> Array:
-    """Return vectors in the fixed frame, from their components in the body frames."""
-    return matvec(poses[:, :3, :3], v) if v.size else v
+def _as_accelerations(accelerations: ArrayLike, shape: tuple[int, ...]) -> Array:
+    array = as_single("accelerations", accelerations, "N", shape[1])
+    if array.shape != shape:
+        raise ValueError(f"accelerations: shape {shape} is wanted, got {array.shape}")
+    return array

@@ -1,18 +1,17 @@
 """Closed forms with the same boundary conditions as the projected cubic (BK section 1).
 
 Each curve is a fixed rotation times the rotation of a quaternion Q(t), whose norm need not be 1.
-`CLOSED_FORMS` lists the closed forms that the course compares; each takes two rotations and two
-angular velocities. Add new closed forms to this list.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array, matvec
 from rbcourse._quaternions import quaternion_of
 from rbcourse._taylor import (
@@ -21,10 +20,9 @@ from rbcourse._taylor import (
     cross,
     exp,
 )
-from rbcourse.curves.bezier import bezier_so3, corrected_bezier_so3, cumulative_bezier_so3
+from rbcourse.body import Body
 from rbcourse.curves.curve import (
     Curve,
-    Ends,
     QuaternionCurve,
     check_defined,
     graded,
@@ -33,97 +31,84 @@ from rbcourse.curves.curve import (
     other_way,
     polynomial_jet,
     which_curve,
-    with_inertia,
 )
-from rbcourse.curves.projected_polynomial import ends_of_quintic, projected_cubic_so3
+from rbcourse.curves.ends import Ends, Given, between
+from rbcourse.curves.projected import projected_cubic, projected_quintic
+from rbcourse.curves.rigid import moving
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import hat, log, right_jacobian_inverse_so3
 
 
-def exponential_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> ExponentialCubic:
+@described_by(projected_cubic)
+def exponential_cubic(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    long: bool = False,
+    duration: ArrayLike = 1.0,
+) -> Curve:
     """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a cubic in exponential coordinates.
 
-    Source: BK 1, its reference 13.
+    Source: BK 1, its reference 13; for ``long``, beyond BK 10.
 
     Parameters
     ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`.
+    start, goal, v0, v1
+        As for `projected_cubic`.
+    long : bool, optional
+        Whether the curve turns the other way round, by 2π − ‖log_so3(R0ᵀ R1)‖.
+    duration
+        As for `projected_cubic`.
 
     Returns
     -------
-    ExponentialCubic
+    Curve
         The curve with σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
         `right_jacobian_inverse_so3`. It meets all four boundary conditions.
 
     Notes
     -----
-    Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ(1). The curve itself is
-    smooth everywhere. If both velocities are along the geodesic, the curve is the optimum among all
-    curves that turn by σ(1). The curve does not depend on the choice of frames, but the reversed
-    ends do not give the reversed curve.
+    Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ(1). If R0 = R1, `long`
+    has no effect. The curve itself is smooth everywhere. If both velocities are along the geodesic,
+    the curve is the optimum among all curves that turn by σ(1). The curve does not depend on the
+    choice of frames, but the reversed ends do not give the reversed curve.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = exponential_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = exponential_cubic(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
     >>> c(1, 1).round(12) + 0.0
     array([0., 1., 0.])
     """
-    ends, T = Ends(R0, R1, w0, w1).over(duration)
-    return _exponential_cubic(ends, T, log(ends.turn))
+    given = between(start, goal, v0, v1, duration=duration)
+    turn = log(given.ends.turn)
+    return moving(given, _exponential_cubic(given, other_way(turn) if long else turn))
 
 
-def exponential_cubic_long_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> ExponentialCubic:
-    """Return the exponential cubic that turns the other way round, by 2π − ‖σ‖.
-
-    Singular set: as for `exponential_cubic_so3`; also R0 = R1, where the short and the long curve
-    are the same.
-    Source: beyond BK 10.
-
-    Parameters
-    ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`.
-
-    Returns
-    -------
-    ExponentialCubic
-        The curve with σ(1) = (1 − 2π/‖σ‖) σ, σ = log_so3(R0ᵀ R1). It meets all four boundary
-        conditions.
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3, log_so3
-    >>> c = exponential_cubic_long_so3(np.eye(3), exp_so3([0, 0, 3]), [0, 0, -4], [0, 0, -4])
-    >>> log_so3(c([0.25, 0.75])).round(2) + 0.0
-    array([[ 0.  ,  0.  , -0.89],
-           [ 0.  ,  0.  , -2.4 ]])
-    """
-    ends, T = Ends(R0, R1, w0, w1).over(duration)
-    return _exponential_cubic(ends, T, other_way(log(ends.turn)))
-
-
-def quaternion_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> QuaternionCubic:
+@described_by(projected_cubic)
+def quaternion_cubic(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    duration: ArrayLike = 1.0,
+) -> Curve:
     """Return the cubic in R⁴ with these ends, projected onto the unit quaternions.
 
     Source: BK 1, its references 6 and 7; BK Remark 7.
 
     Parameters
     ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`.
+    start, goal, v0, v1, duration
+        As for `projected_cubic`.
 
     Returns
     -------
-    QuaternionCubic
-        A `Curve` that has a ``margin`` and meets all four boundary conditions. The cubic has
+    Curve
+        A curve that has a ``margin`` and meets all four boundary conditions. The cubic has
         q' = q (0, w)/2 at its ends. It ends at q1 or −q1, whichever is nearer to q0. If ‖w0‖ and
         ‖w1‖ are below 8 / duration, the curve turns the short way; for faster ends, it can turn by
         two more full turns.
@@ -142,37 +127,45 @@ def quaternion_cubic_so3(
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = quaternion_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = quaternion_cubic(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
     >>> c(1, 1).round(12) + 0.0, float(c.margin.round(3))
     (array([0., 1., 0.]), 0.933)
     """
-    return quaternion_cubic(*Ends(R0, R1, w0, w1).over(duration))
+    given = between(start, goal, v0, v1, duration=duration)
+    return moving(given, normalised_cubic(given.ends, given.duration))
 
 
-def quaternion_cubic(
+def normalised_cubic(
     ends: Ends, T: Array, long: NDArray[np.bool_] | bool = False
 ) -> QuaternionCubic:
-    """Return the quaternion cubic for checked ends; if `long`, it turns the long way round."""
+    """Return the quaternion cubic for ends in unit time; if `long`, it turns the long way round."""
     turn, one = quaternion_of(ends.turn), np.ones(T.shape)
     turn = np.where(np.expand_dims(long, -1), -turn, turn)
-    return QuaternionCubic(**_cubic_from_the_goal(ends, T, turn, one, 0 * one))
+    goal, controls = _cubic_from_the_goal(ends, turn, one, 0 * one)
+    return QuaternionCubic(duration=T, start=goal, controls=controls)
 
 
-def cayley_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> CayleyCubic:
+@described_by(projected_cubic)
+def cayley_cubic(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    duration: ArrayLike = 1.0,
+) -> Curve:
     """Return the cubic with these ends in Cayley parameters about R0.
 
     Source: BK 1, its reference 8.
 
     Parameters
     ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`; R0 and R1 must not be a half-turn apart.
+    start, goal, v0, v1, duration
+        As for `projected_cubic`.
 
     Returns
     -------
-    CayleyCubic
+    Curve
         A curve whose quaternion is (1, g), divided by its norm. The Cayley parameters of a turn by
         the angle a about the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w +
         (g·w) g.
@@ -187,29 +180,31 @@ def cayley_cubic_so3(
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = cayley_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = cayley_cubic(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
     >>> c(1, 1).round(12) + 0.0
     array([0., 1., 0.])
     """
-    ends, T = Ends(R0, R1, w0, w1).over(duration)
-    turn = quaternion_of(ends.turn)
+    given = between(start, goal, v0, v1, duration=duration)
+    ends, T, turn = given.ends, given.duration, quaternion_of(given.ends.turn)
     infinite = np.flatnonzero(turn[..., 0] == 0)
     if len(infinite):
         curve = which_curve(infinite[0], T.shape)
-        raise ValueError(f"R0 and R1{curve} are a half-turn apart: no Cayley parameters")
+        raise ValueError(f"start, goal{curve} are a half-turn apart: no Cayley parameters")
     growth = np.sum(turn[..., 1:] * ends.w1, axis=-1) / (2 * turn[..., 0])
-    return CayleyCubic(**_cubic_from_the_goal(ends, T, turn, 1 / turn[..., 0], growth))
+    goal, controls = _cubic_from_the_goal(ends, turn, 1 / turn[..., 0], growth)
+    return moving(given, CayleyCubic(duration=T, start=goal, controls=controls))
 
 
-def normal_cubic_so3(
-    R0: ArrayLike,
-    R1: ArrayLike,
-    w0: ArrayLike,
-    w1: ArrayLike,
-    inertia: ArrayLike,
+@described_by(projected_cubic)
+def normal_cubic(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
     *,
+    body: Body,
     duration: ArrayLike = 1.0,
-) -> NormalCubic:
+) -> Curve:
     """Return the cubic with these ends in second-order normal coordinates of a body's metric.
 
     Source: beyond BK 7; R. Zimmermann, Hermite interpolation and data processing errors on
@@ -217,12 +212,16 @@ def normal_cubic_so3(
 
     Parameters
     ----------
-    R0, R1, w0, w1, inertia, duration
-        As for `minimum_acceleration_so3`; `inertia` is required.
+    start, goal, v0, v1
+        As for `projected_cubic`.
+    body : Body
+        The body that moves.
+    duration
+        As for `projected_cubic`.
 
     Returns
     -------
-    NormalCubic
+    Curve
         The curve R0 exp(ŷ) with y = x − ½ G⁻¹(x × G x). Here x(t) is the cubic with x(0) = 0,
         x'(0) = w0 and the values of x(1) and x'(1) that give R1 and w1.
 
@@ -233,7 +232,7 @@ def normal_cubic_so3(
     source for the second-order map. The curve is not the optimum, which is a Riemannian cubic. It
     is near-optimal for small excursions: if the excursion is multiplied by s, the relative excess
     over the optimum is multiplied by about s⁴. If G is a multiple of I, the curve is
-    `exponential_cubic_so3`.
+    `exponential_cubic`.
 
     Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses y(1). Ends are also
     singular if the map x ↦ y is singular at x(1). Such ends raise ValueError, as do ends for which
@@ -245,87 +244,75 @@ def normal_cubic_so3(
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1, book = exp_so3([0, 0, 1.5]), np.diag([1.0, 2.22, 3.18])
-    >>> normal_cubic_so3(np.eye(3), R1, [0, 0, 0], [0, 1, 0], book)(1, 1).round(12) + 0.0
+    >>> R1, book = exp_so3([0, 0, 1.5]), Body(np.diag([1.0, 2.22, 3.18]))
+    >>> normal_cubic(np.eye(3), R1, v1=[0, 1, 0], body=book)(1, 1).round(12) + 0.0
     array([0., 1., 0.])
     """
-    ends, G = with_inertia(Ends(R0, R1, w0, w1), inertia)
-    ends, T = ends.over(duration)
-    G = np.broadcast_to(G, (*T.shape, 3, 3))
+    given = between(start, goal, v0, v1, body=body, duration=duration)
+    ends, T = given.ends, given.duration
+    G = np.broadcast_to(given.body.inertia, (*T.shape, 3, 3))
     inverse, turn = np.linalg.inv(G), log(ends.turn)
     goal, by_goal = _normal_coordinates(turn, G, inverse)
     rate = right_jacobian_inverse_so3(turn) @ ends.w1[..., None]
     end_rate = np.linalg.solve(by_goal, rate)[..., 0]
     cubic = np.stack([np.zeros_like(turn), goal, ends.w0, end_rate], axis=-2)
-    return NormalCubic(
+    rotation = NormalCubic(
         duration=T,
+        body=given.body,
         start=quaternion_of(ends.R0),
         controls=np.concatenate([cubic, G, inverse], axis=-2),
     )
+    return moving(given, rotation)
 
 
-def exponential_quintic_so3(
-    R0: ArrayLike,
-    R1: ArrayLike,
-    w0: ArrayLike,
-    w1: ArrayLike,
-    a0: ArrayLike,
-    a1: ArrayLike,
+@described_by(projected_quintic)
+def exponential_quintic(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    a0: ArrayLike | None = None,
+    a1: ArrayLike | None = None,
     *,
     duration: ArrayLike = 1.0,
-) -> ExponentialQuintic:
+) -> Curve:
     """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a quintic.
 
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
 
     Parameters
     ----------
-    R0, R1, w0, w1, a0, a1, duration
-        As for `projected_quintic_so3`.
+    start, goal, v0, v1, a0, a1, duration
+        As for `projected_quintic`.
 
     Returns
     -------
-    ExponentialQuintic
+    Curve
         The curve with σ(0) = 0, σ(1) = log_so3(R0ᵀ R1) and the derivatives of σ that give w and w'
         at both ends.
 
     Notes
     -----
     For small excursions, the curve is near-optimal for minimum jerk (see docs/near_optimal.md).
-    From rest to rest, it is the optimum (`minimum_jerk_so3`). The singular set is that of
-    `exponential_cubic_so3`, and the curve does not depend on the choice of frames.
+    From rest to rest, it is the optimum (`minimum_jerk`). The singular set is that of
+    `exponential_cubic`, and the curve does not depend on the choice of frames.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1, rest = exp_so3([0, 0, 1.5]), [0, 0, 0]
-    >>> exponential_quintic_so3(np.eye(3), R1, rest, rest, rest, [0, 0, 2])(1, 2).round(12) + 0.0
+    >>> exponential_quintic(np.eye(3), exp_so3([0, 0, 1.5]), a1=[0, 0, 2])(1, 2).round(12) + 0.0
     array([0., 0., 2.])
     """
-    ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
-    curve = _exponential_cubic(ends, T, log(ends.turn))
+    given = between(start, goal, v0, v1, a0, a1, duration=duration)
+    (a0, a1), curve = given.bends, _exponential_cubic(given, log(given.ends.turn))
     turn, end_rate = 2 * curve.controls[..., 1, :], 2 * curve.controls[..., 3, :]
     straight = exp([np.moveaxis(x, -1, 0) / 2 for x in (turn, end_rate, 0 * end_rate)])
     w_rate = np.moveaxis(angular_velocity(straight), 0, -1)
     bend = matvec(right_jacobian_inverse_so3(turn), a1 - w_rate)
     more = np.stack([a0, bend], axis=-2) / 2
     controls = np.concatenate([curve.controls, more], axis=-2)
-    return ExponentialQuintic(duration=T, start=curve.start, controls=controls)
-
-
-CLOSED_FORMS: dict[str, Callable[..., Curve]] = {
-    make.__name__: make
-    for make in (
-        projected_cubic_so3,
-        exponential_cubic_so3,
-        bezier_so3,
-        corrected_bezier_so3,
-        cumulative_bezier_so3,
-        quaternion_cubic_so3,
-        cayley_cubic_so3,
-    )
-}
-"""The closed forms for two rotations and two angular velocities, by name."""
+    quintic = ExponentialQuintic(duration=given.duration, start=curve.start, controls=controls)
+    return moving(given, quintic)
 
 
 class ExponentialCubic(QuaternionCurve):
@@ -340,10 +327,12 @@ class ExponentialQuintic(ExponentialCubic):
     """The `Curve` R0 exp(σ̂(t)) with a quintic σ(t)."""
 
 
-def _exponential_cubic(ends: Ends, T: Array, turn: Array) -> ExponentialCubic:
+def _exponential_cubic(given: Given, turn: Array) -> ExponentialCubic:
+    ends = given.ends
     end_rate = matvec(right_jacobian_inverse_so3(turn), ends.w1)
     controls = np.stack([np.zeros_like(turn), turn, ends.w0, end_rate], axis=-2) / 2
-    return ExponentialCubic(duration=T, start=quaternion_of(ends.R0), controls=controls)
+    first = quaternion_of(ends.R0)
+    return ExponentialCubic(duration=given.duration, start=first, controls=controls)
 
 
 class NormalCubic(QuaternionCurve):
@@ -361,7 +350,7 @@ class NormalCubic(QuaternionCurve):
         )
 
 
-def _normal_coordinates(y: Array, G: Array, inverse: Array) -> tuple[Array, Array]:
+def _normal_coordinates(y: Array, G: Array, inverse: Any) -> tuple[Array, Array]:
     """Solve x − ½ G⁻¹(x × G x) = y for x by Newton's method; return x and ∂y/∂x."""
     x = np.zeros_like(y)
     for share in (0.25, 0.5, 0.75, 1):
@@ -398,14 +387,17 @@ class NormalizedCubic(QuaternionCurve):
 
 
 def _cubic_from_the_goal(
-    ends: Ends, T: Array, turn: Array, norm: Array, growth: Array
-) -> dict[str, Array]:
-    """Return the arrays of a `NormalizedCubic`; `growth` is the rate of log ‖Q‖ at the end."""
+    ends: Ends, turn: Array, norm: Array, growth: Array
+) -> tuple[Array, Array]:
+    """Return `start` and `controls` of a `NormalizedCubic`.
+
+    `norm` is ‖Q‖ at the end, and `growth` the rate of log ‖Q‖ there.
+    """
     start, one = quaternion_conjugate(turn), np.eye(4)[0] + np.zeros_like(turn)
     end_rate = growth[..., None] * one + _rate(one, ends.w1)
     cubic = start, norm[..., None] * one, _rate(start, ends.w0), norm[..., None] * end_rate
     goal = quaternion_multiply(quaternion_of(ends.R0), turn)
-    return {"duration": T, "start": goal, "controls": np.stack(cubic, axis=-2)}
+    return goal, np.stack(cubic, axis=-2)
 
 
 class QuaternionCubic(NormalizedCubic):

@@ -7,13 +7,16 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rbcourse._chebyshev import grid
-from rbcourse._checks import as_inertia, as_positive, as_single, check_broadcast
+from rbcourse._checks import as_single, check_broadcast
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array, blocks
+from rbcourse.body import Body
 from rbcourse.curves.chain import smooth_parts
 from rbcourse.curves.curve import Curve, SingularTime, which_curve
+from rbcourse.curves.ends import as_body
 from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
 
 _TOGETHER = 2000  # panels evaluated together, which bounds the memory
@@ -23,15 +26,8 @@ Index: TypeAlias = NDArray[np.intp]
 Density: TypeAlias = Callable[[Curve, Array, Index], Array]
 
 
-def acceleration_cost(
-    curve: Curve,
-    inertia: ArrayLike | None = None,
-    mass: float = 1.0,
-    centre: ArrayLike = (0.0, 0.0, 0.0),
-    *,
-    rtol: float = 1e-10,
-) -> Array:
-    """Return L_a, the integral of the squared acceleration in the metric of BK or of a body.
+def acceleration_cost(curve: Curve, *, body: Body | None = None, rtol: float = 1e-10) -> Array:
+    """Return L_a, the integral of the squared acceleration in the metric of the body.
 
     Source: BK (18), with the covariant acceleration BK (9) in the metrics BK (12) and BK (14); for
     other inertias, beyond BK 1.
@@ -40,11 +36,9 @@ def acceleration_cost(
     ----------
     curve : Curve
         A curve on SO(3) or SE(3), or a stack of curves.
-    inertia : array_like, shape (..., 3, 3), optional
-        The inertia about the centre of mass, as for `minimum_acceleration_so3`: one matrix for all
-        curves, or one for each curve.
-    mass, centre : float above 0; array_like, shape (3,); optional
-        The mass of the body, and its centre of mass in the body frame; for SE(3) only.
+    body : Body, optional
+        The body that moves along the curve: one for all curves of a stack, or one for each curve.
+        The default is ``curve.body``. On SO(3), only its inertia matters.
     rtol : float, optional
         The relative error, from 1e-12 to 0.1. If `rtol` is at least 1e-8, the quadrature starts
         with two panels instead of 16 or more. The quadrature is then 3 to 40 times as fast, but may
@@ -54,11 +48,11 @@ def acceleration_cost(
     -------
     ndarray, shape curve.batch_shape
         ∫ τᵀ G⁻¹ τ dt with the torque τ = G w' + w × G w. On SE(3), ∫ m ‖d_c''‖² dt is added, where
-        d_c is the position of the centre of mass. By default, the cost is ∫ 2 ‖w'‖² dt, and on
+        d_c is the position of the centre of mass. For the ball, the cost is ∫ 2 ‖w'‖² dt, and on
         SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. The relative error is `rtol`. For tiny costs, the absolute
-        error is 1e-20 times a third of the trace of G (2e-20 by default). The errors may be larger
-        if the acceleration has peaks or ripples that are narrower than a hundredth of the interval,
-        for example if the ``f`` of a `projected_line_so3` changes abruptly.
+        error is 1e-20 times a third of the trace of G (2e-20 for the ball). The errors may be
+        larger if the acceleration has peaks or ripples that are narrower than a hundredth of the
+        interval, for example if the ``f`` of a `projected_line` changes abruptly.
 
     Raises
     ------
@@ -68,112 +62,111 @@ def acceleration_cost(
 
     Notes
     -----
-    A curve does not store the inertia, mass and centre for which it was made: give them again. The
-    vector G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ is its squared norm.
+    The vector G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ is its squared norm.
     Free motions have the cost 0. On SE(3), the cost is a sum of two parts
     (`acceleration_cost_parts`). This sum depends on the unit of length. Ratios of such sums also
     depend on it, unless inertia and mass are those of a body.
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, projected_line_so3
-    >>> line = projected_line_so3(np.eye(3), exp_so3([0, 0, 1.5]))
+    >>> from rbcourse import exp_so3, projected_line
+    >>> line = projected_line(np.eye(3), exp_so3([0, 0, 1.5]))
     >>> float(acceleration_cost(line).round(4))
     6.7627
-    >>> float(acceleration_cost(line, np.diag([1.0, 2, 2.5])).round(4))  # 2.5 in place of 2
+    >>> book = Body(np.diag([1.0, 2, 2.5]))
+    >>> float(acceleration_cost(line, body=book).round(4))  # 2.5 in place of 2
     8.4534
     """
-    rotation, translation = acceleration_cost_parts(curve, inertia, mass, centre, rtol=rtol)
+    rotation, translation = acceleration_cost_parts(curve, body=body, rtol=rtol)
     return rotation + translation
 
 
+@described_by(acceleration_cost)
 def acceleration_cost_parts(
-    curve: Curve,
-    inertia: ArrayLike | None = None,
-    mass: float = 1.0,
-    centre: ArrayLike = (0.0, 0.0, 0.0),
-    *,
-    rtol: float = 1e-10,
+    curve: Curve, *, body: Body | None = None, rtol: float = 1e-10
 ) -> tuple[Array, Array]:
     """Return the two parts of `acceleration_cost`: rotation and translation.
 
+    The errors are those of `acceleration_cost`.
     Source: BK (18); for other inertias, beyond BK 1.
 
     Parameters
     ----------
-    curve, inertia, mass, centre, rtol
-        As for `acceleration_cost`, with the same errors.
+    curve, body, rtol
+        As for `acceleration_cost`.
 
     Returns
     -------
     rotation, translation : ndarray, shape curve.batch_shape
-        The rotation costs ∫ τᵀ G⁻¹ τ dt, by default ∫ 2 ‖w'‖² dt. The translation costs ∫ m
+        The rotation costs ∫ τᵀ G⁻¹ τ dt, for the ball ∫ 2 ‖w'‖² dt. The translation costs ∫ m
         ‖d_c''‖² dt, or 0 on SO(3).
 
     Examples
     --------
-    >>> from rbcourse import pose_from_coordinates, projected_cubic_se3
-    >>> A1, rest = pose_from_coordinates([0, 0, 0, 1, 0, 0]), [0, 0, 0]
-    >>> c = projected_cubic_se3(np.eye(4), A1, rest, rest, rest, rest)
+    >>> from rbcourse import pose_from_coordinates, projected_cubic
+    >>> c = projected_cubic(np.eye(4), pose_from_coordinates([0, 0, 0, 1, 0, 0]))
     >>> rotation, translation = acceleration_cost_parts(c)
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
     check_curve(curve, on_so3=False)
-    m, r = as_positive("mass", mass), as_single("centre", centre, 3)
-    if curve.size == 3 and (m != 1 or r.any()):
-        raise ValueError("mass, centre: a curve on SO(3) has neither of them")
-    name = "acceleration cost"
+    name, body = "acceleration cost", as_body(body, curve.body)
     legs = smooth_parts(curve, name, 1)
     functional: Functional = BallAcceleration()
-    if inertia is not None:
-        functional = Effort(_inertias(curve, legs, inertia), of_torque=False)
+    if not body.is_ball:
+        functional = Effort(_inertias(curve, legs, body), of_torque=False)
     rotation = rotation_cost(name, legs, functional, rtol)
     translation: Array = np.zeros(legs.count)
     if legs.size == 4:
-        translation = m * integral(name, legs, partial(_squared_acceleration, r), rtol)
+        squared = partial(_squared_acceleration, body.centre)
+        translation = body.mass * integral(name, legs, squared, rtol)
     return summed(curve, rotation, legs, 3), summed(curve, translation, legs, 3)
 
 
-def torque_cost(curve: Curve, inertia: ArrayLike, *, rtol: float = 1e-10) -> Array:
-    """Return ∫ ‖τ‖² dt, with the torque τ = G w' + w × G w that moves a body along the curve.
+@described_by(acceleration_cost)
+def torque_cost(curve: Curve, *, body: Body | None = None, rtol: float = 1e-10) -> Array:
+    """Return ∫ ‖τ‖² dt, with the torque τ = G w' + w × G w that turns a body along the curve.
 
+    The errors and the accuracy are those of `acceleration_cost`.
     Source: beyond BK 4.
 
     Parameters
     ----------
-    curve, inertia, rtol
-        As for `acceleration_cost`, but on SO(3) only. The errors and the accuracy are the same.
+    curve, body, rtol
+        As for `acceleration_cost`.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
+        The cost. On SE(3), τ is the torque about the centre of mass.
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, geodesic_so3
-    >>> c = geodesic_so3(np.eye(3), exp_so3([1.0, 1.0, 0]))  # no acceleration, but w × G w
-    >>> float(torque_cost(c, np.diag([1.0, 2, 2.5])).round(12))
+    >>> from rbcourse import exp_so3, geodesic
+    >>> c = geodesic(np.eye(3), exp_so3([1.0, 1.0, 0]))  # no acceleration, but w × G w
+    >>> float(torque_cost(c, body=Body(np.diag([1.0, 2, 2.5]))).round(12))
     1.0
     """
-    check_curve(curve)
+    check_curve(curve, on_so3=False)
     legs = smooth_parts(curve, "torque cost", 1)
-    functional = Effort(_inertias(curve, legs, inertia), of_torque=True)
-    cost = rotation_cost("torque cost", legs, functional, rtol)
+    inertias = _inertias(curve, legs, as_body(body, curve.body))
+    cost = rotation_cost("torque cost", legs, Effort(inertias, of_torque=True), rtol)
     return summed(curve, cost, legs, 3)
 
 
+@described_by(acceleration_cost)
 def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     """Return ∫ 2 ‖w'' + ½ w × w'‖² dt, the integral of the squared covariant jerk in metric (12).
 
-    The cost is the same for the inverse motion Rᵀ(t), unlike ∫ 2 ‖w''‖² dt.
+    The cost is the same for the inverse motion Rᵀ(t), unlike ∫ 2 ‖w''‖² dt. The curve must be on
+    SO(3). The errors and the accuracy are those of `acceleration_cost`; an error is also raised if
+    the acceleration of a `chain` jumps.
     Source: beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
 
     Parameters
     ----------
     curve, rtol
-        As for `acceleration_cost`, but on SO(3) only. The errors and the accuracy are the same. An
-        error is also raised if the acceleration of a `chain` jumps.
+        As for `acceleration_cost`.
 
     Returns
     -------
@@ -181,9 +174,8 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, minimum_jerk_so3
-    >>> rest = [0, 0, 0]
-    >>> c = minimum_jerk_so3(np.eye(3), exp_so3([0, 0, 1.5]), rest, rest, rest, rest)
+    >>> from rbcourse import exp_so3, minimum_jerk
+    >>> c = minimum_jerk(np.eye(3), exp_so3([0, 0, 1.5]))  # from rest to rest
     >>> float(jerk_cost(c).round(9))  # 2 · 720 · 1.5²
     3240.0
     """
@@ -201,13 +193,13 @@ def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
         raise ValueError(f"curve: a curve on SO(3) is wanted, got {curve!r}")
 
 
-def _inertias(curve: Curve, legs: Curve, inertia: ArrayLike) -> Array:
-    G = as_inertia("inertia", inertia)
-    batch = check_broadcast(curve=(np.empty(curve.batch_shape), 0), inertia=(G, 2))
+def _inertias(curve: Curve, legs: Curve, body: Body) -> Array:
+    G = body.inertia
+    batch = check_broadcast(curve=(np.empty(curve.batch_shape), 0), body=(G, 2))
     if batch != curve.batch_shape:
         raise ValueError(
-            f"inertia: a single matrix or a stack of shape {curve.batch_shape} is wanted, "
-            f"got shape {G.shape}"
+            f"body: a single body or a stack of shape {curve.batch_shape} is wanted, "
+            f"got shape {body.batch_shape}"
         )
     return np.broadcast_to(G, (*legs.batch_shape, 3, 3)).reshape(-1, 3, 3)
 

@@ -1,4 +1,4 @@
-"""Rotations and poses over time: the class `Curve`, boundary conditions, and geodesics."""
+"""Rotations and poses over time: the class `Curve`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbcourse._checks import (
     as_array,
     as_duration,
-    as_finite,
-    as_inertia,
+    as_single,
     as_time,
     check_broadcast,
     check_order,
@@ -23,82 +22,13 @@ from rbcourse._checks import (
 from rbcourse._hermite import hermite
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
-from rbcourse._valid import as_rotations
-from rbcourse.so3 import hat, log
+from rbcourse._valid import as_poses, as_rotations
+from rbcourse.body import Body
+from rbcourse.curves._html import curve_html
 
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
-AnyCurve = TypeVar("AnyCurve", bound="Curve")
-
-
-class _Ends(NamedTuple):
-    R0: Array
-    R1: Array
-    w0: Array
-    w1: Array
-
-
-class Ends(_Ends):
-    """Boundary conditions: rotations and angular velocities at both ends, in a common batch shape.
-
-    `Ends` is a tuple, so that ``make(*ends)`` calls a function ``make`` with these arguments.
-    Source: BK 6.2.
-
-    Parameters
-    ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        Rotation matrices and angular velocities.
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3
-    >>> ends = Ends(np.eye(3), exp_so3([[0, 0, 1], [0, 0, 1.5]]), [0, 0, 0], [0, 1, 0])
-    >>> ends.w1.shape
-    (2, 3)
-    """
-
-    __slots__ = ()
-
-    def __new__(cls, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Self:
-        """Check the arguments, and broadcast them to a common batch shape."""
-        R0 = as_rotations("R0", R0)
-        R1 = as_rotations("R1", R1)
-        w0 = as_finite("w0", w0, 3)
-        w1 = as_finite("w1", w1, 3)
-        batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
-        return cls._make((R0, R1, w0, w1)).broadcast_to(batch)
-
-    @property
-    def turn(self) -> Array:
-        """The rotation R0ᵀ R1 from the start to the end."""
-        return np.swapaxes(self.R0, -1, -2) @ self.R1
-
-    def over(self, duration: ArrayLike) -> tuple[Self, Array]:
-        """Return the ends rescaled to unit time, and the durations, in a common batch shape."""
-        T = as_duration("duration", duration)
-        batch = check_broadcast(ends=(self.R0, 2), duration=(T, 0))
-        T, (R0, R1, w0, w1) = np.broadcast_to(T, batch), self.broadcast_to(batch)
-        return type(self)._make((R0, R1, T[..., None] * w0, T[..., None] * w1)), T
-
-    def flat(self) -> Self:
-        """Return the ends with a single batch axis."""
-        return type(self)._make(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self)
-
-    def broadcast_to(self, batch: tuple[int, ...]) -> Self:
-        """Return the ends, broadcast to another batch shape."""
-        shapes = (3, 3), (3, 3), (3,), (3,)
-        arrays = zip(self, shapes, strict=True)
-        return type(self)._make(np.broadcast_to(x, (*batch, *shape)) for x, shape in arrays)
-
-    def take(self, index: Any) -> Self:
-        """Return the ends that a NumPy index into the batch axes selects."""
-        return type(self)._make(x[index] for x in self)
-
-
-def with_inertia(ends: Ends, inertia: ArrayLike) -> tuple[Ends, Array]:
-    """Broadcast the boundary conditions and the inertia to a common batch shape."""
-    G = as_inertia("inertia", inertia)
-    batch = check_broadcast(ends=(ends.R0, 2), inertia=(G, 2))
-    return ends.broadcast_to(batch), np.broadcast_to(G, (*batch, 3, 3))
+BALL = Body.ball()
+Order: TypeAlias = Literal[0, 1, 2, 3]
 
 
 class SingularTime(ValueError):
@@ -114,6 +44,14 @@ class SingularTime(ValueError):
         return f"t = {self.time}{which_curve(self.curve, self.batch_shape)}: {self.reason}"
 
 
+class State(NamedTuple):
+    """A curve and its first two derivatives: ``c(t)``, ``c(t, 1)`` and ``c(t, 2)``."""
+
+    pose: Array
+    velocity: Array
+    acceleration: Array
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Curve:
     """A rotation or a pose over time: ``c(t)``, with derivatives ``c(t, 1)`` and ``c(t, 2)``.
@@ -124,13 +62,13 @@ class Curve:
 
     On SE(3), ``c(t)`` is the pose A, and ``c(t, 1)`` is the twist S = (w, v), with A' = A
     hat_se3(S). ``c(t, 2)`` is the covariant acceleration (w', Rᵀ d'') in metric (14). It is *not*
-    the derivative (w', v') of the twist, which `twist_rate` returns.
+    the derivative (w', v') of the twist, which `twist_rate` returns. There is no third derivative.
 
     The derivatives are exact. Times of shape ``t.shape`` and a stack of curves of shape ``(...)``
     give results of the shapes ``t.shape + (..., 3, 3)`` and ``t.shape + (..., 3)``. On SE(3), the
     shapes are ``t.shape + (..., 4, 4)`` and ``t.shape + (..., 6)``. A stack is indexed like an
     array of its shape: ``c[2]`` is its third curve. The first axes of all array attributes are the
-    axes of the stack.
+    axes of the stack. Curves are immutable, and their arrays are read-only.
 
     Source: BK (1), BK (9), BK 6.
 
@@ -138,14 +76,29 @@ class Curve:
     ----------
     duration : ndarray, shape (...)
         The duration of each curve, which starts at t = 0. Velocities are per unit of this time.
+    body : Body
+        The body that moves along the curve, for its costs and for its fastest timing. By default,
+        it is the ball of the paper's metrics (12) and (14).
     batch_shape : tuple of int
         The shape of the stack; ``()`` for a single curve.
     domain : tuple of float
         The first and the last time. For a stack, the domain is the interval that all curves have in
         common; for an empty stack, it is (0, inf).
+    margin : ndarray, shape (...)
+        For projections: the least distance, in a sense that their functions define, from matrices
+        without a unique projection. It is infinite for all other curves.
     """
 
     duration: Array
+    body: Body = BALL
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for name, value in vars(self).items():
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                view = value.view()
+                view.flags.writeable = False
+                object.__setattr__(self, name, view)
 
     @property
     def batch_shape(self) -> tuple[int, ...]:
@@ -162,10 +115,15 @@ class Curve:
         """The number of curves."""
         return self.duration.size
 
-    @property
+    @cached_property
     def domain(self) -> tuple[float, float]:
         """The first and the last time."""
         return 0.0, float(self.duration.min(initial=np.inf))
+
+    @property
+    def margin(self) -> Array:
+        """The margin of a projection; infinite for other curves."""
+        return np.full(self.batch_shape, np.inf)
 
     @property
     def breakpoints(self) -> Array:
@@ -180,22 +138,74 @@ class Curve:
         fastest = (w + np.sqrt(a)).max(axis=1, initial=0)
         return graded(np.arange(17) / 16, [0.0, 1.0], 1 / (1 + fastest))
 
-    def __call__(self, t: ArrayLike, order: int = 0) -> Array:
+    def __call__(self, t: ArrayLike, order: Order = 0) -> Array:
         """Return the curve, or a derivative, at times of any shape in the domain.
 
-        `order` is from 0 to 3, or from 0 to 2 on SE(3). Times may exceed the domain by 8 eps of its
-        larger end.
+        Parameters
+        ----------
+        t : array_like, shape t.shape
+            Times. They may exceed the domain by 8 eps of its larger end.
+        order : {0, 1, 2, 3}, optional
+            The order of the derivative; on SE(3), at most 2.
 
         Examples
         --------
-        >>> from rbcourse import exp_so3
-        >>> c = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]))
+        >>> from rbcourse import exp_so3, geodesic
+        >>> c = geodesic(np.eye(3), exp_so3([0, 0, 1.5]))
         >>> c(np.linspace(0, 1, 5)).shape, c(0.5, 1).shape
         ((5, 3, 3), (3,))
         """
+        self._check_order(order)
         times = as_time(t, 0, self.domain)
-        values = self.evaluate(times.reshape(-1, 1), self._check_order(order))
+        if times.ndim == 0 and not self.batch_shape:
+            return self._once(float(times), (order,))[0]
+        values = self.evaluate(times.reshape(-1, 1), order)
         return values.reshape(times.shape + self.batch_shape + self._core(order))
+
+    def state(self, t: ArrayLike) -> State:
+        """Return the pose (or rotation), the velocity and the acceleration, in one pass.
+
+        Parameters
+        ----------
+        t : array_like, shape t.shape
+            Times in the domain.
+
+        Returns
+        -------
+        State
+            The ``pose``, ``velocity`` and ``acceleration``: ``c(t)``, ``c(t, 1)`` and ``c(t, 2)``.
+
+        Examples
+        --------
+        >>> from rbcourse import exp_so3, geodesic
+        >>> R, w, a = geodesic(np.eye(3), exp_so3([0, 0, 1.5])).state(0.5)
+        >>> w.round(12)
+        array([0. , 0. , 1.5])
+        """
+        times = as_time(t, 0, self.domain)
+        if times.ndim == 0 and not self.batch_shape:
+            return State(*self._once(float(times), (0, 1, 2)))
+        return State(self(times), self(times, 1), self(times, 2))
+
+    def _once(self, t: float, orders: tuple[int, ...]) -> list[Array]:
+        """Return derivatives of a single curve at one time."""
+        T = float(self.duration)
+        try:
+            values = self.single(0, t / T, orders)
+        except SingularTime as error:
+            raise SingularTime(error.time * T, 0, error.reason) from None
+        return [x / T**k if k else x for x, k in zip(values, orders, strict=True)]
+
+    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+        """Return derivatives of curve number i of the flat stack at one time from 0 to 1.
+
+        Subclasses replace this by a method without the overhead of stacks.
+        """
+        flat, time = self.flat if self.count == 1 else self.flat.take([i]), np.array([[t]])
+        try:
+            return [flat.values(time, k)[0, 0] for k in orders]
+        except SingularTime as error:
+            raise SingularTime(error.time, i, error.reason) from None
 
     def twist_rate(self, t: ArrayLike) -> Array:
         """Return the derivative of ``c(t, 1)``.
@@ -204,8 +214,8 @@ class Curve:
 
         Examples
         --------
-        >>> from rbcourse import pose_from_coordinates, screw_se3
-        >>> c = screw_se3(np.eye(4), pose_from_coordinates([0, 0, 1, 2, 0, 0]))
+        >>> from rbcourse import pose_from_coordinates, screw
+        >>> c = screw(np.eye(4), pose_from_coordinates([0, 0, 1, 2, 0, 0]))
         >>> c.twist_rate(0.5).round(12) + 0.0  # the twist of a screw motion is constant
         array([0., 0., 0., 0., 0., 0.])
         """
@@ -215,7 +225,7 @@ class Curve:
             rate[..., 3:] -= cross(twist[..., :3], twist[..., 3:])
         return rate
 
-    def at_own_times(self, t: ArrayLike, order: int = 0) -> Array:
+    def at_own_times(self, t: ArrayLike, order: Order = 0) -> Array:
         """Evaluate each curve of the stack, or a derivative, at its own times.
 
         `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or t.shape
@@ -228,7 +238,8 @@ class Curve:
         start = self.domain[0]
         times = as_time(times, 0, (start, start + self.duration))
         rows = math.prod(times.shape[: times.ndim - stacked])
-        values = self.evaluate(times.reshape(rows, self.count), self._check_order(order))
+        self._check_order(order)
+        values = self.evaluate(times.reshape(rows, self.count), order)
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
@@ -237,14 +248,100 @@ class Curve:
             raise TypeError("a single curve is not a stack and has no index")
         return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
 
+    def __len__(self) -> int:
+        """Return the length of the first axis of a stack."""
+        if not self.batch_shape:
+            raise TypeError("a single curve is not a stack and has no length")
+        return self.batch_shape[0]
+
+    def __bool__(self) -> bool:
+        """Return True, also for a single curve, which has no length."""
+        return True
+
+    def retimed(self, duration: ArrayLike) -> Self:
+        """Return the curve reparameterised linearly to a new duration, with the same start time.
+
+        Parameters
+        ----------
+        duration : array_like, shape (...)
+            The new duration, at least 1e-100: one for all curves, or one for each curve. For a
+            `chain`, the duration must not be lost in rounding when it is added to the first time.
+
+        Returns
+        -------
+        Curve
+            A curve of the same kind, with the same body. If the duration is multiplied by k,
+            velocities and accelerations are divided by k and k², and `acceleration_cost` by k³. If
+            a `chain` starts at the time a, its pose at the time t moves to the time a + k (t − a).
+
+        Examples
+        --------
+        >>> from rbcourse import exp_so3, geodesic
+        >>> c = geodesic(np.eye(3), exp_so3([0, 0, 1.5])).retimed(3)
+        >>> c.domain, c(3, 1).round(12)
+        ((0.0, 3.0), array([0. , 0. , 0.5]))
+        """
+        T = as_duration("duration", duration)
+        if check_broadcast(curve=(self.duration, 0), duration=(T, 0)) != self.batch_shape:
+            wanted = f"a single number or shape {self.batch_shape} is wanted"
+            raise ValueError(f"duration: {wanted}, got shape {T.shape}")
+        return self.lasting(np.broadcast_to(T, self.batch_shape))
+
+    def moved(self, left: ArrayLike | None = None, right: ArrayLike | None = None) -> Curve:
+        """Return the curve L c(t) X: the same motion in another fixed frame or body frame.
+
+        Parameters
+        ----------
+        left, right : array_like, shape (3, 3) on SO(3), (4, 4) on SE(3), optional
+            L moves the fixed frame. X is the new body frame in the old one, such as the offset of a
+            tool.
+
+        Returns
+        -------
+        Curve
+            A curve with the same body, whose inertia and centre are relative to the new body frame,
+            and with the same costs. A `chain` remains a chain; other curves have the attribute
+            ``curve``, the original.
+
+        Examples
+        --------
+        >>> from rbcourse import pose_from_coordinates, screw
+        >>> c = screw(np.eye(4), pose_from_coordinates([0, 0, np.pi / 2, 0, 0, 0]))
+        >>> tip = c.moved(right=pose_from_coordinates([0, 0, 0, 2, 0, 0]))  # 2 m ahead
+        >>> tip(1)[:3, 3].round(12), tip(1, 1)[3:].round(3)
+        (array([0., 2., 0.]), array([0.   , 3.142, 0.   ]))
+        """
+        check = as_rotations if self.size == 3 else as_poses
+        L, X = (
+            np.eye(self.size)
+            if given is None
+            else check(name, as_single(name, given, *self._core(0)))
+            for name, given in (("left", left), ("right", right))
+        )
+        return self._moved(L, X)
+
+    def _moved(self, L: Array, X: Array) -> Curve:
+        d = X[:3, 3] if self.size == 4 else np.zeros(3)
+        body = self.body.moved(X[:3, :3], d)
+        return Moved(duration=self.duration, body=body, curve=self, left=L, right=X)
+
     def __repr__(self) -> str:
-        """Return the kind of curve, the shape of the stack, and the domain."""
+        """Return the kind of curve, the stack, the domain, and the cost of an optimum."""
         stack = f", stack of shape {self.batch_shape}" if self.batch_shape else ""
         start, end = self.domain
-        return f"<{self._what()} on {_GROUPS[self.size]}{stack}, t in [{start:g}, {end:g}]>"
+        what = f"{self._what()} on {_GROUPS[self.size]}{stack}, t in [{start:g}, {end:g}]"
+        return f"<{what}{self._result()}>"
+
+    def _repr_html_(self) -> str:
+        """Return the description, and a picture of the speeds, for notebooks."""
+        return curve_html(self)
 
     def _what(self) -> str:
         return type(self).__name__
+
+    def _result(self) -> str:
+        """Return words about the cost of an optimum; "" for other curves."""
+        return ""
 
     def take(self, index: Any) -> Self:
         """Return the stack of the curves with these indices in the flattened stack."""
@@ -253,6 +350,8 @@ class Curve:
         for name, value in parts.items():
             if isinstance(value, Curve):
                 parts[name] = value.take(index)
+            elif isinstance(value, Body):
+                parts[name] = value.take(index, self.batch_shape)
             elif isinstance(value, np.ndarray):
                 flat = value.reshape(self.count, *value.shape[stacked:])
                 parts[name] = np.asarray(flat[index])
@@ -292,8 +391,8 @@ class Curve:
         """The same curves as a stack with one axis."""
         return self if len(self.batch_shape) == 1 else self.take(np.arange(self.count))
 
-    def _check_order(self, order: int) -> int:
-        return check_order(order, 3 if self.size == 3 else 2)
+    def _check_order(self, order: int) -> None:
+        check_order(order, 3 if self.size == 3 else 2)
 
     def _core(self, order: int) -> tuple[int, ...]:
         return (self.size,) * 2 if order == 0 else (3 * self.size - 6,)
@@ -330,6 +429,60 @@ class QuaternionCurve(Curve):
         return np.ascontiguousarray(np.moveaxis(self.controls, (-2, -1), (0, 1)))
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Moved(Curve):
+    """The `Curve` L c(t) X; ``curve`` is c, ``left`` is L and ``right`` is X."""
+
+    curve: Curve
+    left: Array
+    right: Array
+
+    @property
+    def size(self) -> int:
+        """The size of the curve's matrices."""
+        return self.curve.size
+
+    @property
+    def margin(self) -> Array:
+        """The margin of the curve that is moved."""
+        return self.curve.margin
+
+    @property
+    def breakpoints(self) -> Array:
+        """The `Curve.breakpoints` of the curve that is moved."""
+        return self.curve.breakpoints
+
+    def take(self, index: Any) -> Self:
+        """Return the stack of the curves with these indices in the flattened stack."""
+        some, body = self.curve.take(index), self.body.take(index, self.batch_shape)
+        return replace(self, duration=some.duration, body=body, curve=some)
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the same curves with other durations."""
+        return replace(self, duration=duration, curve=self.curve.lasting(duration))
+
+    def values(self, t: Array, order: int) -> Array:
+        """Return L c X, or a derivative in the new body frame."""
+        if order == 0:
+            return self.left @ self.curve.values(t, 0) @ self.right
+        return moved_rates(self.right, *(self.curve.values(t, k + 1) for k in range(order)))[-1]
+
+
+def moved_rates(X: Array, *rates: Array) -> list[Array]:
+    """Return velocities and accelerations (as ``c(t, 1)`` and ``c(t, 2)``) relative to the frame X.
+
+    The point r of the body, the new origin, has the velocity v + w × r and the acceleration
+    a + w' × r + w × (w × r).
+    """
+    R, found = X[:3, :3], [x.copy() for x in rates]
+    if X.shape == (4, 4):
+        r, w = X[:3, 3], rates[0][..., :3]
+        found[0][..., 3:] += cross(w, r)
+        if len(rates) > 1:
+            found[1][..., 3:] += cross(rates[1][..., :3], r) + cross(w, cross(w, r))
+    return [x @ (R if x.shape[-1] == 3 else np.kron(np.eye(2), R)) for x in found]
+
+
 def other_way(turn: Array) -> Array:
     """Return the rotation vectors that reach the same rotations the other way round."""
     angle = np.linalg.norm(turn, axis=-1, keepdims=True)
@@ -341,58 +494,6 @@ def polynomial_jet(ends: Array, t: Array, order: int) -> Jet:
     return [hermite(ends, t, k) for k in range(order + 1)]
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class AlongGeodesic(Curve):
-    """The `Curve` R0 exp(σ̂ p(t)) on the geodesic from R0 to R0 exp(σ̂); by default, p(t) = t.
-
-    Source: BK 6.1.
-
-    Attributes
-    ----------
-    R0, rotation_vector : ndarray, shapes (..., 3, 3) and (..., 3)
-        The start, and the rotation vector σ from the start to the goal, in the body frame.
-    """
-
-    rotation_vector: Array
-    terms: Array  # R0, R0 K and R0 K², for Rodrigues' formula R0 (I + sin a K + (1 − cos a) K²)
-
-    @property
-    def R0(self) -> Array:
-        """The start."""
-        return self.terms[..., 0, :, :]
-
-    def _progress(self, t: Array, order: int) -> Array:
-        """Return p or a derivative, shape (T, count) or (T, 1)."""
-        return identity(t, order)
-
-    def values(self, t: Array, order: int) -> Array:
-        """Return R0 exp(σ̂ p), or σ times a derivative of p."""
-        progress, count = self._progress(t, order), self.count
-        if order:
-            values = np.empty((len(t), count, 3))
-            for i in range(3):  # four times as fast as one product
-                np.multiply(progress, self.rotation_vector[:, i], out=values[..., i])
-            return values
-        weights = np.empty((3, count, len(t)))
-        weights[0] = 1
-        _write_sine_and_versine(progress.T, self._half_angle, *weights[1:])
-        return weighted_sums(weights.T, self.terms.reshape(count, 3, 9), 3, 3)
-
-    @cached_property
-    def _half_angle(self) -> Array:
-        return np.linalg.norm(self.rotation_vector, axis=-1, keepdims=True) / 2
-
-
-def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
-    """Write sin a and 1 − cos a, computed from tan(a/2), where a is 2 · `half` · `progress`."""
-    tangent = np.tan(np.multiply(progress, half, out=versine), out=versine)
-    np.multiply(tangent, tangent, out=sine)
-    sine += 1
-    np.divide(tangent, sine, out=sine)
-    sine *= 2
-    versine *= sine
-
-
 def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
     """Return, for each curve of a stack, the weighted sums of its terms.
 
@@ -402,88 +503,6 @@ def weighted_sums(weights: Array, terms: Array, *core: int) -> Array:
     sums = np.empty((len(weights), len(terms), terms.shape[-1]))
     np.matmul(np.swapaxes(weights, 0, 1), terms, out=np.swapaxes(sums, 0, 1))
     return sums.reshape(*sums.shape[:2], *core)
-
-
-def geodesic_so3(R0: ArrayLike, R1: ArrayLike, *, duration: ArrayLike = 1.0) -> AlongGeodesic:
-    """Return the shortest curve from R0 to R1, at constant angular velocity.
-
-    Source: BK 6.1.
-
-    Parameters
-    ----------
-    R0, R1 : array_like, shape (..., 3, 3)
-        Rotation matrices.
-    duration : array_like, shape (...), optional
-        The duration of the motion.
-
-    Returns
-    -------
-    AlongGeodesic
-        The `Curve` R0 exp(σ̂ t), where the ``rotation_vector`` is σ = log_so3(R0ᵀ R1), with ‖σ‖ ≤
-        π.
-
-    Notes
-    -----
-    Singular set: R0 and R1 are a half-turn apart. Two geodesics are then shortest. In the
-    ``rotation_vector`` of the returned geodesic, the component of largest magnitude (the first, if
-    several are equal) is positive.
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3
-    >>> c = geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5]), duration=3)
-    >>> c(0.3, 1).round(12)  # the velocity
-    array([0. , 0. , 0.5])
-    """
-    return AlongGeodesic(**geodesic_data(R0, R1, duration))
-
-
-def geodesic_data(R0: ArrayLike, R1: ArrayLike, duration: ArrayLike) -> dict[str, Array]:
-    """Return the attributes of the `AlongGeodesic` that `geodesic_so3` returns."""
-    R0, R1 = as_rotations("R0", R0), as_rotations("R1", R1)
-    T = as_duration("duration", duration)
-    batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), duration=(T, 0))
-    turn = np.broadcast_to(log(np.swapaxes(R0, -1, -2) @ R1), (*batch, 3))
-    angle = np.linalg.norm(turn, axis=-1, keepdims=True)
-    K = hat(turn / np.where(angle == 0, 1.0, angle))
-    swept = R0 @ K
-    terms = np.stack(np.broadcast_arrays(R0, swept, swept @ K), axis=-3)
-    return {"duration": np.broadcast_to(T, batch), "rotation_vector": turn, "terms": terms}
-
-
-def retime(curve: AnyCurve, duration: ArrayLike) -> AnyCurve:
-    """Return the curve reparameterised linearly to a new duration, with the same start time.
-
-    Parameters
-    ----------
-    curve : Curve
-        A curve or a stack of curves.
-    duration : array_like, shape (...)
-        The new duration, at least 1e-100: one for all curves, or one for each curve. For a `chain`,
-        the duration must not be lost in rounding when it is added to the first time.
-
-    Returns
-    -------
-    Curve
-        A curve of the same kind. If the duration is multiplied by k, velocities and accelerations
-        are divided by k and k², and `acceleration_cost` by k³. If a `chain` starts at the time a,
-        its pose at the time t moves to the time a + k (t − a).
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3, geodesic_so3
-    >>> c = retime(geodesic_so3(np.eye(3), exp_so3([0, 0, 1.5])), 3)
-    >>> c.domain, c(3, 1).round(12)
-    ((0.0, 3.0), array([0. , 0. , 0.5]))
-    """
-    if not isinstance(curve, Curve):
-        raise ValueError(f"curve: a Curve is wanted, got {curve!r}")
-    T = as_duration("duration", duration)
-    if check_broadcast(curve=(curve.duration, 0), duration=(T, 0)) != curve.batch_shape:
-        raise ValueError(
-            f"duration: a single number or shape {curve.batch_shape} is wanted, got shape {T.shape}"
-        )
-    return curve.lasting(np.broadcast_to(T, curve.batch_shape))
 
 
 def identity(t: Array, order: int) -> Array:

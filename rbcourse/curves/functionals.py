@@ -38,7 +38,7 @@ minus momenta · δ at t = 0.
 Attributes
 ----------
 name : str
-    The name of the optimum.
+    The name of the deviation u.
 ends : int
     The number of end values of an optimum: 2 (w at 0 and 1) or 4 (also w'). It is also the order of
     the highest derivative of w in p.
@@ -57,7 +57,7 @@ class BallAcceleration:
     Source: BK (18), BK (19).
     """
 
-    name, ends, scale, unit = "MinimumAcceleration", 2, 2.0, 1.0
+    name, ends, scale, unit = "acceleration", 2, 2.0, 1.0
     needs: tuple[int, ...] = (2,)
 
     def take(self, index: Any) -> Self:
@@ -114,7 +114,7 @@ class Effort:
         size = np.trace(G, axis1=-2, axis2=-1) / 3
         self.G = G / size[:, None, None]
         self.of_torque = of_torque
-        self.name = "MinimumTorque" if of_torque else "MinimumAcceleration"
+        self.name = "torque" if of_torque else "acceleration"
         self.M = np.broadcast_to(np.eye(3), G.shape) if of_torque else np.linalg.inv(self.G)
         self.root = np.linalg.cholesky(self.M).mT
         self.scale = self.unit = size**2 if of_torque else size
@@ -179,7 +179,7 @@ class Jerk:
     Crouch 1995.
     """
 
-    name, ends, scale, unit = "MinimumJerk", 4, 2.0, 1.0
+    name, ends, scale, unit = "jerk", 4, 2.0, 1.0
     needs: tuple[int, ...] = (1, 2, 3)
 
     def take(self, index: Any) -> Self:

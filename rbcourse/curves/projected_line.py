@@ -11,14 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_angle, as_array
 from rbcourse._numerics import EPS, Array
-from rbcourse.curves.curve import (
-    AlongGeodesic,
-    check_defined,
-    geodesic_data,
-    identity,
-    near_margins,
-    which_curve,
-)
+from rbcourse.curves.curve import Curve, check_defined, identity, near_margins, which_curve
+from rbcourse.curves.ends import Given, between
+from rbcourse.curves.geodesics import AlongGeodesic, geodesic_data
+from rbcourse.curves.rigid import moving
 from rbcourse.projection import NOT_UNIQUE, warn_if_nearly_singular
 from rbcourse.straight_line import f as straight_line_f
 from rbcourse.straight_line import singular_value, theta_at, theta_bend, theta_rate, theta_third
@@ -102,59 +98,75 @@ class ProjectedLine(AlongGeodesic):
         return near_margins(super().breakpoints, 0.5, self.margin)
 
 
-def projected_line_so3(
-    R0: ArrayLike, R1: ArrayLike, f: Progress | None = None, *, duration: ArrayLike = 1.0
-) -> ProjectedLine:
-    """Return the curve R0 exp(σ̂ θ(f(t))): the projection of the line R0 + (R1 − R0) f(t) on SO(3).
+def projected_line(
+    start: ArrayLike,
+    goal: ArrayLike,
+    f: Progress | None = None,
+    *,
+    duration: ArrayLike = 1.0,
+) -> Curve:
+    """Return the projection of the line R0 + (R1 − R0) f(t) on SO(3): R0 exp(σ̂ θ(f(t))).
 
     Source: BK Prop. 6, BK Cor. 1, BK Cor. 2, BK (15), BK (16).
 
     Parameters
     ----------
-    R0, R1, duration
-        As for `projected_cubic_so3`.
+    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
+        Rotation matrices, or poses.
     f : callable, optional
         For order 0, ``f(t, order)`` returns the position on the line at time t, with f(0) = 0 and
         f(1) = 1 up to 1e-12. For orders 1 and 2, it returns the derivatives. The jerk ``c(t, 3)``
         also needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch
         axis. By default f(t) = t.
+    duration : array_like, shape (...), optional
+        The duration of the motion.
 
     Returns
     -------
-    ProjectedLine
-        A `Curve` with the attribute ``margin``.
+    Curve
+        A curve with the attribute ``margin``. For poses, the origin moves on a straight line at
+        constant speed.
 
     Notes
     -----
-    Singular set: R0 and R1 are a half-turn apart. At f(t) = 1/2, the projection then jumps from R0
-    to R1, and a call of the curve raises ValueError. The computed ``margin`` is accurate to a few
-    eps; a ``margin`` below 1e-6 gives a RuntimeWarning. The projection is accurate to eps divided
-    by the sum of the two smallest eigenvalues of RᵀM. This sum is at least ``margin``. A call of
-    the curve also raises ValueError if `f` returns non-finite values or an array of the wrong
-    shape.
+    Singular set: the rotations are a half-turn apart. At f(t) = 1/2, the projection then jumps from
+    R0 to R1, and a call of the curve raises ValueError. The computed ``margin`` is accurate to a
+    few eps; a ``margin`` below 1e-6 gives a RuntimeWarning. The projection is accurate to eps
+    divided by the sum of the two smallest eigenvalues of RᵀM. This sum is at least ``margin``. A
+    call of the curve also raises ValueError if `f` returns non-finite values or an array of the
+    wrong shape.
 
     Examples
     --------
     >>> from rbcourse import exp_so3, log_so3
     >>> from rbcourse.straight_line import f
     >>> R0, R1 = np.eye(3), exp_so3([0, 0, 1.5])
-    >>> log_so3(projected_line_so3(R0, R1)([0.25, 0.5, 0.75]))[:, 2].round(3)  # slow, fast, slow
+    >>> log_so3(projected_line(R0, R1)([0.25, 0.5, 0.75]))[:, 2].round(3)  # slow, fast, slow
     array([0.314, 0.75 , 1.186])
-    >>> c = projected_line_so3(R0, R1, lambda t, order: f(t, 1.5, order))
+    >>> c = projected_line(R0, R1, lambda t, order: f(t, 1.5, order))
     >>> log_so3(c([0.25, 0.5, 0.75]))[:, 2].round(3)  # uniform
     array([0.375, 0.75 , 1.125])
     """
     if not (f is None or callable(f)):
         raise ValueError(f"f: a callable f(t, order) is wanted, got {f!r}")
-    return _projected_line(geodesic_data(R0, R1, duration), f or identity)
-
-
-def _projected_line(data: dict[str, Array], timing: Progress) -> ProjectedLine:
-    if timing is straight_line_f:
+    if f is straight_line_f:
         raise ValueError("f: bind it to an angle, as in lambda t, order: f(t, angle, order)")
-    shape = data["duration"].shape
+    given = between(start, goal, duration=duration)
+    return moving(given._replace(path=given.path[:2]), _checked_line(given, f or identity))
+
+
+def _checked_line(given: Given, timing: Progress) -> ProjectedLine:
+    shape = given.duration.shape
     number = np.arange(math.prod(shape)).reshape(shape)
-    curve = ProjectedLine(**data, timing=timing, number=number, timed=shape)
+    turn, terms = geodesic_data(given)
+    curve = ProjectedLine(
+        duration=given.duration,
+        rotation_vector=turn,
+        terms=terms,
+        timing=timing,
+        number=number,
+        timed=shape,
+    )
     warn_if_nearly_singular(curve.margin, 0.5, "t" if timing is identity else "f(t)")
     start, end = curve.take(number.ravel()).on_line(np.array([[0.0], [1.0]]), 0)
     for i in np.flatnonzero((np.abs(start) > 1e-12) | (np.abs(end - 1) > 1e-12)):

@@ -41,15 +41,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import inf, sqrt
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_finite, as_inertia, as_positive, as_single, as_time
+from rbcourse._checks import as_finite, as_single, as_time
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, blocks, cross, matvec, reported
+from rbcourse.body import Body
 from rbcourse.curves.chain import Chain, evaluate_legs
 from rbcourse.curves.curve import Curve
+from rbcourse.curves.ends import as_body
 
 REFINEMENTS = 3  # how often the cells of a leg are halved if it exceeds a limit
 TOLERANCE = 1e-4  # the share by which a limit may be exceeded
@@ -68,20 +71,24 @@ Row = tuple[str, Array, Array, Array]
 Rows = Callable[[Array, Array, Array], Iterator[Row]]
 
 
+class Limits(TypedDict, total=False):
+    """The largest allowed values of a motion, and the gravity; `fastest` describes them."""
+
+    angular_speed: ArrayLike | None
+    speed: ArrayLike | None
+    angular_acceleration: ArrayLike | None
+    acceleration: ArrayLike | None
+    torque: ArrayLike | None
+    force: ArrayLike | None
+    gravity: ArrayLike
+
+
 def fastest(
     curve: Curve,
     *,
-    angular_speed: ArrayLike | None = None,
-    speed: ArrayLike | None = None,
-    angular_acceleration: ArrayLike | None = None,
-    acceleration: ArrayLike | None = None,
-    torque: ArrayLike | None = None,
-    force: ArrayLike | None = None,
-    inertia: ArrayLike | None = None,
-    mass: float = 1.0,
-    centre: ArrayLike = (0.0, 0.0, 0.0),
-    gravity: ArrayLike = (0.0, 0.0, 0.0),
+    body: Body | None = None,
     rates: tuple[float, float] = (0.0, 0.0),
+    **limits: Unpack[Limits],
 ) -> Timed:
     """Return a curve that follows the given path as fast as the limits allow.
 
@@ -92,23 +99,29 @@ def fastest(
     curve : Curve
         A single curve. Only its path is used; its times do not matter. For a `Timed`, this is the
         path from which it was made.
-    angular_speed, speed, angular_acceleration, acceleration : float or array_like, shape (3,)
-        The largest allowed norms: of ω, of the velocity of the body's point `centre`, of ω', and of
-        the acceleration of this point. Three numbers limit the magnitudes of the components in the
-        body frame instead. For rotations, only ω, ω' and the torque can be limited.
-    torque, force : float or array_like, shape (3,)
-        The largest allowed norms of the torque G ω' + ω × G ω and of the force. The force is `mass`
-        times the acceleration of `centre`, minus the weight. At least one limit on an acceleration,
-        the torque or the force is required.
-    inertia : array_like, shape (3, 3), optional
-        The inertia G about the centre of mass; required for a limit on the torque.
-    mass, centre, gravity : float; array_like, shape (3,); optional
-        For a limit on the force, these are the mass, the centre of mass in the body frame, and the
-        acceleration of free fall in the fixed frame. Without such a limit, `centre` may be any
-        point, such as the tip of a tool.
+    body : Body, optional
+        The body that moves, by default ``curve.body``. It is required for a limit on the torque or
+        the force if the body of the curve is the default ball. Its centre is the point whose speed
+        and acceleration are limited; ``curve.moved(right=...)`` moves the origin to another point,
+        such as the tip of a tool.
     rates : (float, float), optional
         The values of s' at both ends: 0 is rest, and 1 is the velocity of the path itself. A rate
         has no effect at an end where the curve rests.
+    **limits
+        At least one limit on an acceleration, the torque or the force is required.
+
+        angular_speed, speed : float or array_like, shape (3,)
+            The largest norms of ω, in rad per unit time, and of the velocity of the centre, in m
+            per unit time. Three numbers limit the magnitudes of the components in the body frame
+            instead, here and below. For rotations, only ω, ω' and the torque can be limited.
+        angular_acceleration, acceleration : float or array_like, shape (3,)
+            The largest norms of ω', and of the acceleration of the centre.
+        torque, force : float or array_like, shape (3,)
+            The largest norms of the torque G ω' + ω × G ω and of the force. The force is the mass
+            times the acceleration of the centre, minus the weight.
+        gravity : array_like, shape (3,)
+            The acceleration of free fall in the fixed frame, by default 0, for a limit on the
+            force.
 
     Returns
     -------
@@ -147,27 +160,15 @@ def fastest(
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, geodesic_so3
-    >>> turn = geodesic_so3(np.eye(3), exp_so3([0, 0, 3]))
+    >>> from rbcourse import exp_so3, geodesic
+    >>> turn = geodesic(np.eye(3), exp_so3([0, 0, 3]))
     >>> c = fastest(turn, angular_speed=1, angular_acceleration=2)  # 3/1 + 1/2 s
     >>> round(c.domain[1], 4), c(1.75, 1).round(9)
     (3.5, array([0., 0., 1.]))
     """
     given = curve.curve if isinstance(curve, Timed) else curve
-    rows_of = _limits(
-        given,
-        angular_speed=angular_speed,
-        speed=speed,
-        angular_acceleration=angular_acceleration,
-        acceleration=acceleration,
-        torque=torque,
-        force=force,
-        inertia=inertia,
-        mass=mass,
-        centre=centre,
-        gravity=gravity,
-    )
-    if all(x is None for x in (angular_acceleration, acceleration, torque, force)):
+    rows_of = _limits(given, body, **limits)
+    if all(limits.get(name) is None for name in _BENDS):
         raise ValueError(f"limits: one of {', '.join(_BENDS)} is needed")
     ends = as_single("rates", rates, 2)
     if ends.min() < 0:
@@ -189,7 +190,10 @@ def fastest(
     return grid.timed(given, x, y)
 
 
-def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
+@described_by(fastest)
+def limits_used(
+    curve: Curve, *, body: Body | None = None, **limits: Unpack[Limits]
+) -> dict[str, tuple[float, float]]:
     """Return, for each limit, the largest share that a curve uses, and the time of this maximum.
 
     Source: beyond BK 16.
@@ -198,8 +202,8 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
     ----------
     curve : Curve
         A single curve.
-    **limits
-        The keyword arguments of `fastest`, without `rates`.
+    body, **limits
+        As for `fastest`.
 
     Returns
     -------
@@ -210,11 +214,11 @@ def limits_used(curve: Curve, **limits: Any) -> dict[str, tuple[float, float]]:
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, geodesic_so3
-    >>> limits_used(geodesic_so3(np.eye(3), exp_so3([0, 0, 3])), angular_speed=[1, 1, 2])
+    >>> from rbcourse import exp_so3, geodesic
+    >>> limits_used(geodesic(np.eye(3), exp_so3([0, 0, 3])), angular_speed=[1, 1, 2])
     {'angular_speed': (1.5, 0.0)}
     """
-    return _shares(curve, _limits(curve, **limits), 20_001)
+    return _shares(curve, _limits(curve, body, **limits), 20_001)
 
 
 def _shares(curve: Curve, rows_of: Rows, count: int) -> dict[str, tuple[float, float]]:
@@ -276,6 +280,10 @@ class Timed(Curve):
         k = duration / self.duration
         return replace(self, duration=duration, rate=self.rate / k, times=self.times * k)
 
+    def _moved(self, L: Array, X: Array) -> Curve:
+        moved = self.curve._moved(L, X)
+        return replace(self, body=moved.body, curve=moved)
+
     def progress(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Return s, s' and s'' at the times t."""
         t = as_time(t, 0, self.domain)
@@ -297,6 +305,16 @@ class Timed(Curve):
             return c[0] * v if order else c[0]
         return c[0] * u + c[1] * v**2 if order == 2 else 3 * c[0] * u * v + c[1] * v**3
 
+    def _once(self, t: float, orders: tuple[int, ...]) -> list[Array]:
+        s, v, u = (float(x) for x in self.progress(t))
+        c = self._path._once(s, tuple(range(max(orders) + 1)))
+        by_order = [c[0], c[1] * v] if len(c) > 1 else c
+        if len(c) > 2:
+            by_order.append(c[1] * u + c[2] * v**2)
+        if len(c) > 3:
+            by_order.append(3 * c[2] * u * v + c[3] * v**3)
+        return [by_order[k] for k in orders]
+
     def values(self, t: Array, order: int) -> Array:
         """Raise RuntimeError, because costs require smooth curves."""
         raise RuntimeError("curve: a Timed curve has no cost here, because its acceleration jumps")
@@ -309,10 +327,8 @@ class Timed(Curve):
 
 def _limits(
     curve: Curve,
+    body: Body | None,
     *,
-    inertia: ArrayLike | None = None,
-    mass: float = 1.0,
-    centre: ArrayLike = (0.0, 0.0, 0.0),
     gravity: ArrayLike = (0.0, 0.0, 0.0),
     **limits: ArrayLike | None,
 ) -> Rows:
@@ -329,10 +345,10 @@ def _limits(
             raise ValueError(f"{name}: a curve on SO(3) has no such limit")
     if not most:
         raise ValueError(f"limits: none of {', '.join(_SPEEDS + _BENDS)} is given")
-    if "torque" in most and inertia is None:
-        raise ValueError("inertia: it is required for a limit on the torque")
-    G = np.eye(3) if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
-    m, r = as_positive("mass", mass), as_single("centre", centre, 3)
+    moved = as_body(body, curve.body)
+    if {"torque", "force"} & most.keys() and body is None and curve.body is Body.ball():
+        raise ValueError("body: it is required for a limit on the torque or the force")
+    G, m, r = as_single("body.inertia", moved.inertia, 3, 3), moved.mass, moved.centre
     g = as_single("gravity", gravity, 3)
 
     def rows(V: Array, A: Array, R: Array) -> Iterator[Row]:
@@ -512,7 +528,7 @@ class _Grid:
                 np.append(steps, 0),
             )
         times = np.cumsum(steps)
-        return Timed(duration=times[-1], curve=curve, s=s, rate=rate, times=times)
+        return Timed(duration=times[-1], body=curve.body, curve=curve, s=s, rate=rate, times=times)
 
     def place(self, cell: np.intp | int) -> float:
         """Return s at the start of a cell."""

@@ -23,27 +23,39 @@ literature, we found no linear system for the velocities.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from operator import index
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_inertia, as_single
+from rbcourse._checks import as_single
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse._quaternions import quaternion_of
-from rbcourse.metrics import weight_of
+from rbcourse.body import Body, weight_of
+from rbcourse.curves.ends import as_body
 from rbcourse.se3 import check_path
 from rbcourse.so3 import hat, log, right_jacobian_so3, vee
 
-PathEnds = str | tuple[ArrayLike | None, ArrayLike | None]
-"""The end conditions of a path: "natural", "periodic", or a pair of velocities."""
+PathEnds: TypeAlias = (
+    Literal["natural", "rest", "periodic"] | tuple[ArrayLike | None, ArrayLike | None]
+)
+"""The end conditions of a path: a word, or a pair of velocities."""
 
 _SHORTEST, _LONGEST = 1e-100, 1e100  # limits of a duration
 _NEAR_HALF_TURN = 1e-6
+_ENDS = "'natural', 'rest', 'periodic' or a pair of velocities"
 
 
 def spline_velocities(
-    times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natural", inertia: ArrayLike | None = None
+    times: ArrayLike,
+    poses: ArrayLike,
+    ends: PathEnds = "natural",
+    *,
+    rest_at: Sequence[int] | NDArray[np.integer] = (),
+    body: Body | None = None,
 ) -> Array:
     """Return the velocities for which cubic legs join with a continuous acceleration.
 
@@ -52,22 +64,28 @@ def spline_velocities(
 
     Parameters
     ----------
-    times, poses
-        As for `bessel_velocities`.
-    ends : {"natural", "periodic"} or pair of array_like, optional
-        "natural": the acceleration is 0 at both ends. "periodic": velocity and acceleration in the
-        body frame are the same at both ends; the poses there may differ. A pair gives the first and
-        the last velocity in the body frame: twists (ω, v), shape (6,), or ω, shape (3,). None in a
-        pair means a natural end.
-    inertia : array_like, shape (3, 3), optional
-        The inertia of a body, as for `weighted_cubic_so3`. The torque is then continuous, and
-        "natural" means zero torque at the ends. The default is 2 I.
+    times : array_like, shape (N,)
+        Two or more increasing times.
+    poses : array_like, shape (N, 3, 3) or (N, 4, 4)
+        A rotation matrix or a pose for each of the times.
+    ends : {"natural", "rest", "periodic"} or pair of array_like, optional
+        "natural": the acceleration is 0 at both ends. "rest": the velocity is 0 at both ends.
+        "periodic": velocity and acceleration in the body frame are the same at both ends; the poses
+        there may differ. A pair gives the first and the last velocity in the body frame: angular
+        velocities, shape (3,), or twists (ω, v), shape (6,). None in a pair means a natural end.
+    rest_at : sequence of int, optional
+        The indices of other poses at which the velocity is 0. A repeated pose is not such a pose
+        unless it is listed here.
+    body : Body, optional
+        The body that moves, by default the ball of metric (12). For other bodies, the torque is
+        continuous, "natural" means zero torque at the ends, and the centre of mass moves on a cubic
+        spline.
 
     Returns
     -------
     ndarray, shape (N, 6) or (N, 3)
         Twists (ω, v), or angular velocities ω, per unit of the times, for the legs of
-        `projected_spline_so3` and `projected_spline_se3`.
+        `projected_spline`.
 
     Notes
     -----
@@ -85,12 +103,25 @@ def spline_velocities(
            [ 0.335,  0.345, -0.614]])
     """
     times, poses, _ = checked_path(times, poses)
-    G = None if inertia is None else as_inertia("inertia", as_single("inertia", inertia, 3, 3))
-    systems = _systems(np.diff(times), poses, G)
-    conditions = as_ends(ends, len(poses), 3 * len(systems))
-    columns = np.split(conditions.given, len(systems), axis=1)
-    each = zip(systems, columns, strict=True)
-    return np.concatenate([x.solve(conditions._replace(given=y)) for x, y in each], axis=1)
+    conditions = as_ends(ends, len(poses), 3 * poses.shape[-1] - 6, rest_at)
+    return cubic_velocities(times, poses, conditions, as_body(body))
+
+
+def cubic_velocities(times: Array, poses: Array, conditions: Conditions, body: Body) -> Array:
+    """Compute `spline_velocities` without checks."""
+    h, R, given = np.diff(times), poses[:, :3, :3], conditions.given
+    w = _rotation_system(h, R, body).solve(conditions._replace(given=given[:, :3]))
+    if poses.shape[-1] == 3:
+        return w
+    return np.concatenate([w, path_velocities(h, poses, w, conditions, body.centre)], axis=1)
+
+
+def path_velocities(h: Array, poses: Array, w: Array, conditions: Conditions, r: Array) -> Array:
+    """Return v = Rᵀ d' at the poses; the point r of the body moves on a cubic spline."""
+    R = poses[:, :3, :3]
+    given = conditions.given[:, 3:] + np.cross(conditions.given[:, :3], r)
+    system = path_system(h, R, poses[:, :3, 3] + R @ r)
+    return system.solve(conditions._replace(given=given)) - np.cross(w, r)
 
 
 class Conditions(NamedTuple):
@@ -169,19 +200,17 @@ def _cubic_system(h: Array, G: Array, B: Array, *loads: Array) -> KnotSystem:
     return KnotSystem(same, 2 * k * B, same, *(6 * k[:, 0] ** 2 * x for x in loads))
 
 
-def _systems(h: Array, poses: Array, G: Array | None = None) -> list[KnotSystem]:
-    """Return the systems of w, in the metric G, and for poses also of the velocity v = Rᵀ d'."""
-    R, d = poses[:, :3, :3], poses[:, :3, 3:]
+def _rotation_system(h: Array, R: Array, body: Body) -> KnotSystem:
+    """Return the system of the angular velocities."""
     Q = R[:-1].mT @ R[1:]
-    if G is None:
+    if body.is_ball:
         load = _skew(Q) / 2
         B = (np.trace(Q, axis1=1, axis2=2)[:, None, None] * np.eye(3) - Q.mT) / 2
-        turning = _cubic_system(h, np.eye(3), B, load, load)
-    else:
-        W = weight_of("inertia", G)
-        B = _skew(Q[:, None] @ (hat(np.eye(3)) @ W)).mT
-        turning = _cubic_system(h, G, B, _skew(Q @ W), -_skew(Q.mT @ W))
-    return [turning, path_system(h, R, d[..., 0])] if d.size else [turning]
+        return _cubic_system(h, np.eye(3), B, load, load)
+    G = as_single("body.inertia", body.inertia, 3, 3)
+    W = weight_of("body.inertia", G)
+    B = _skew(Q[:, None] @ (hat(np.eye(3)) @ W)).mT
+    return _cubic_system(h, G, B, _skew(Q @ W), -_skew(Q.mT @ W))
 
 
 def path_system(h: Array, R: Array, d: Array) -> KnotSystem:
@@ -202,37 +231,38 @@ def _skew(X: Array) -> Array:
     return vee(X - X.mT)
 
 
-def as_ends(ends: PathEnds | Conditions, count: int, size: int) -> Conditions:
+def as_ends(
+    ends: PathEnds, count: int, size: int, rest_at: Sequence[int] | NDArray[np.integer] = ()
+) -> Conditions:
     """Return the end conditions for `count` knots, with `size` values at each."""
-    if isinstance(ends, Conditions):
-        return ends
-    fixed, given = np.zeros(count, bool), np.zeros((count, size))
+    fixed, given = _rests(rest_at, count), np.zeros((count, size))
     if isinstance(ends, str):
-        if ends not in ("natural", "periodic"):
-            raise ValueError(f"ends: 'natural', 'periodic' or a pair is wanted, got {ends!r}")
+        if ends not in ("natural", "rest", "periodic"):
+            raise ValueError(f"ends: {_ENDS} is wanted, got {ends!r}")
+        if ends == "periodic" and fixed.any():
+            raise ValueError("rest_at: not with ends='periodic'")
+        fixed[[0, -1]] |= ends == "rest"
         return Conditions(fixed, given, ends == "periodic")
-    if len(ends) != 2:
-        raise ValueError(f"ends: a pair of velocities is wanted, got {len(ends)} of them")
+    if not isinstance(ends, tuple | list) or len(ends) != 2:
+        raise ValueError(f"ends: {_ENDS} is wanted, got {ends!r}")
     for place, value in ((0, ends[0]), (-1, ends[1])):
         if value is not None:
             fixed[place], given[place] = True, as_single("ends", value, size)
     return Conditions(fixed, given)
 
 
-def resting_spline(times: Array, poses: Array, rest_at: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return (w, Rᵀ d') and (w', Rᵀ d'') at the poses; for rotations, only w and w'.
-
-    All of them are 0 at the poses `rest_at`, shape (N,).
-    """
-    found = []
-    for system in _systems(np.diff(times), poses):
-        x = system.solve(Conditions(rest_at, np.zeros((len(poses), 3))))
-        starts = system.b0 - matvec(system.A, x[:-1]) - matvec(system.B, x[1:])
-        found.append([x, np.where(rest_at[:, None], 0, np.append(starts, 0 * x[:1], axis=0))])
-    velocities, accelerations = np.concatenate(found, axis=-1)
-    return velocities, accelerations
+def _rests(rest_at: Sequence[int] | NDArray[np.integer], count: int) -> NDArray[np.bool_]:
+    rests = np.zeros(count, bool)
+    try:
+        rests[[index(i) for i in rest_at]] = True
+    except (TypeError, IndexError) as error:
+        raise ValueError(
+            f"rest_at: indices of the {count} poses are wanted, got {rest_at!r}"
+        ) from error
+    return rests
 
 
+@described_by(spline_velocities)
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     """Return velocities from parabolas; each parabola joins a pose to its two neighbours.
 
@@ -244,8 +274,8 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
 
     Parameters
     ----------
-    times, poses : array_like, shapes (N,) and (N, 4, 4) or (N, 3, 3)
-        Two or more increasing times, and for each of them a pose or a rotation matrix.
+    times, poses
+        As for `spline_velocities`.
 
     Returns
     -------

@@ -38,21 +38,23 @@ def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Tabl
 
     Examples
     --------
-    >>> from rbcourse import geodesic_se3
+    >>> from rbcourse import geodesic
     >>> t = np.linspace(0, 1, 7)
-    >>> motion_table(t, geodesic_se3(np.eye(4), np.eye(4)), t[::2])["drawn [1]"]
+    >>> motion_table(t, geodesic(np.eye(4), np.eye(4)), t[::2])["drawn [1]"]
     array([1, 0, 1, 0, 1, 0, 1])
     """
     first = {f"t [{unit}]": t, "drawn [1]": np.isin(t, drawn).astype(int)}
     per, per2 = ("", "") if unit == "1" else (f"/{unit}", f"/{unit}²")
-    parts = {f"w{{}} [rad{per}]": (1, 0), f"v{{}} [m{per}]": (1, 3)}
-    parts |= {f"w{{}}' [rad{per2}]": (2, 0), f"a{{}} [m{per2}]": (2, 3)}
+    state = motion.state(t)
+    parts = {f"w{{}} [rad{per}]": (state.velocity, 0), f"v{{}} [m{per}]": (state.velocity, 3)}
+    parts |= {f"w{{}}' [rad{per2}]": (state.acceleration, 0)}
+    parts |= {f"a{{}} [m{per2}]": (state.acceleration, 3)}
     rates = {
-        name.format(i + 1): motion(t, order)[:, start + i]
-        for name, (order, start) in parts.items()
+        name.format(i + 1): rate[:, start + i]
+        for name, (rate, start) in parts.items()
         for i in range(3)
     }
-    return {**pose_table(first, motion(t)), **rates}
+    return {**pose_table(first, state.pose), **rates}
 
 
 def draw_box(ax: Any, pose: Array, edges: float | Array) -> Faces:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rbcourse._chebyshev import along, chebyshev, grid
 from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, matvec
-from rbcourse.curves.curve import Ends
+from rbcourse.curves.ends import Ends
 from rbcourse.curves.functionals import Functional
 from rbcourse.optimum._collocation import TOGETHER, cayley
 from rbcourse.so3 import exp_so3, hat, log, vee

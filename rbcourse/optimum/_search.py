@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rbcourse._chebyshev import grid
 from rbcourse._numerics import EPS, Array
-from rbcourse.curves.bezier import corrected_bezier_so3
-from rbcourse.curves.curve import Ends
+from rbcourse.curves.bezier import corrected_bezier
+from rbcourse.curves.ends import Ends
 from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.optimum._collocation import (
     BallStationary,
@@ -124,7 +124,7 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
     slow = np.flatnonzero(largest < LIMITS.one_start)
     if not len(slow):
         return {}
-    curves = corrected_bezier_so3(*ends.take(slow))
+    curves = corrected_bezier(*ends.take(slow))
     R = np.ascontiguousarray(curves(grid(LIMITS.nodes).t).swapaxes(0, 1))
     found = relax_ball(equations.take(slow), R)
     each = zip(slow.tolist(), found, strict=True)

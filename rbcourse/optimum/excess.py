@@ -53,9 +53,9 @@ def excess_estimate(curve: Curve) -> Array:
 
     Examples
     --------
-    >>> from rbcourse import exp_so3, minimum_acceleration_so3, projected_cubic_so3
+    >>> from rbcourse import exp_so3, projected_cubic
     >>> ends = np.eye(3), exp_so3([0, 0, 0.9]), [0, 0, 0], [0, 1, 0]
-    >>> float(excess_estimate(projected_cubic_so3(*ends)).round(4))
+    >>> float(excess_estimate(projected_cubic(*ends)).round(4))
     0.0197
     """
     check_curve(curve)

@@ -1,4 +1,7 @@
-"""Optima through many poses (`rbcourse.optimum._spline` has the method)."""
+"""Curves of least acceleration, torque or jerk through many rotations or poses.
+
+`rbcourse.optimum._spline` has the method.
+"""
 
 from __future__ import annotations
 
@@ -9,60 +12,59 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._chebyshev import grid
-from rbcourse._checks import as_inertia, as_positive, as_single
+from rbcourse._checks import as_single
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
-from rbcourse._valid import as_poses, as_rotations
+from rbcourse.body import Body
 from rbcourse.curves.chain import Chain
-from rbcourse.curves.closed import quaternion_cubic
-from rbcourse.curves.curve import Ends
-from rbcourse.curves.functionals import BallAcceleration, Effort, Jerk
-from rbcourse.curves.rigid import RigidMotion, rigid_motion
+from rbcourse.curves.closed import normalised_cubic
+from rbcourse.curves.ends import Ends, as_body
+from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
 from rbcourse.curves.velocities import (
     Conditions,
     PathEnds,
     as_ends,
     checked_path,
-    path_system,
+    path_velocities,
     quaternion_system,
+    spline_velocities,
 )
-from rbcourse.optimum import ConvergenceError, Optimum, optimum_of
-from rbcourse.optimum._collocation import (
-    NODES,
-    Failure,
-    on_nodes,
-)
-from rbcourse.optimum._second_variation import is_positive
+from rbcourse.optimum._collocation import NODES, Failure, on_nodes
+from rbcourse.optimum._result import OptimalMotion, OptimalRotation, optimum_of
 from rbcourse.optimum._spline import Found, Problem, solve_spline
+from rbcourse.optimum.two_poses import ConvergenceError
 from rbcourse.projection import nearest
 
 
-def minimum_acceleration_spline_so3(
+@described_by(spline_velocities)
+def minimum_acceleration_spline(
     times: ArrayLike,
-    rotations: ArrayLike,
+    poses: ArrayLike,
     ends: PathEnds = "natural",
     *,
-    inertia: ArrayLike | None = None,
+    body: Body | None = None,
     long: ArrayLike = False,
 ) -> OptimalChain:
-    """Return the curve of least acceleration through many rotations, for a ball or any body.
+    """Return the curve of least acceleration through many rotations or poses.
 
-    Source: BK (18); beyond BK 12, beyond BK 15.
+    Source: BK (18), BK 6.3; beyond BK 12, beyond BK 15.
 
     Parameters
     ----------
-    times, rotations, ends
-        As for `projected_spline_so3`.
-    inertia : array_like, shape (3, 3), optional
-        As for `minimum_acceleration_so3`.
+    times, poses, ends
+        As for `spline_velocities`.
+    body : Body, optional
+        The body that moves, by default the ball of metrics (12) and (14).
     long : array_like of bool, shape (N − 1,), optional
-        Whether each leg of the starting curve turns the long way, by 2π minus the least angle.
+        Whether each leg of the starting curve turns the long way, by 2π minus the least angle. One
+        value holds for all legs.
 
     Returns
     -------
     OptimalChain
-        A `Chain` of `Optimum` legs with the least `acceleration_cost` that Newton's method finds,
-        starting from `quaternion_spline_so3`. w' (for a body, the torque) is continuous, and 0 at
-        natural ends.
+        A `Chain` of optimal legs with the least `acceleration_cost` that Newton's method finds,
+        starting from `quaternion_spline`. w' (for a body, the torque) is continuous, and 0 at
+        natural ends. For poses, the centre of mass moves on a cubic spline.
 
     Raises
     ------
@@ -74,40 +76,68 @@ def minimum_acceleration_spline_so3(
     If velocities are given at both ends, a curve of least acceleration exists. With natural or
     periodic ends, it may not exist. For example, for rotations by 0, 1 and 0.3 rad about one axis,
     at the times 0, 1 and 1 + √2, more full turns on the legs make the cost as small as you like.
-    For bodies, a result that is not `certified` can have a leg that is a saddle.
+    For bodies, a result that is not ``certified`` can have a leg that is a saddle.
     A leg that is much shorter than its neighbours may spin; to prevent this, insert poses. Singular
     set: neighbouring rotations a half-turn apart raise ValueError.
 
     Examples
     --------
-    >>> from rbcourse import acceleration_cost, exp_so3, projected_spline_so3
+    >>> from rbcourse import acceleration_cost, exp_so3, projected_spline
     >>> path = [0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]])
-    >>> c = minimum_acceleration_spline_so3(*path)
+    >>> c = minimum_acceleration_spline(*path)
     >>> c.certified, bool(np.abs(c.jumps(2)).max() < 1e-9)
     (True, True)
-    >>> round(float(acceleration_cost(projected_spline_so3(*path)) / c.cost) - 1, 3)
+    >>> round(float(acceleration_cost(projected_spline(*path)) / c.cost) - 1, 3)
     0.201
     """
-    return _spline(times, rotations, ends, inertia, "acceleration", long)
+    times, poses, _ = checked_path(times, poses)
+    size, h, of_mass = 3 * poses.shape[-1] - 6, np.diff(times), as_body(body)
+    conditions = as_ends(ends, len(poses), size)
+    rotations = conditions._replace(given=conditions.given[:, :3])
+    turning = _spline(times, poses[:, :3, :3], rotations, of_mass, "acceleration", long)
+    if size == 3:
+        return turning
+    R, w = poses[:, :3, :3], turning.velocities
+    v = path_velocities(h, poses, w, conditions, of_mass.centre)
+    d = poses[:, :3, 3] + R @ of_mass.centre
+    rate = matvec(R, v + np.cross(w, of_mass.centre))
+    path = [d[:-1], d[1:], h[:, None] * rate[:-1], h[:, None] * rate[1:]]
+    legs = OptimalMotion(
+        duration=h,
+        body=of_mass,
+        rotation=turning.optimum,
+        path=np.stack(path, axis=-2),
+    )
+    cost = turning.cost + of_mass.mass * float(np.sum(legs.moving_cost))
+    return replace(turning, legs=legs, velocities=np.append(w, v, axis=1), cost=cost)
 
 
-def minimum_torque_spline_so3(
+@described_by(spline_velocities, minimum_acceleration_spline)
+def minimum_torque_spline(
     times: ArrayLike,
-    rotations: ArrayLike,
+    poses: ArrayLike,
     ends: PathEnds = "natural",
     *,
-    inertia: ArrayLike,
+    body: Body,
     long: ArrayLike = False,
 ) -> OptimalChain:
     """Return the curve with the least integral of squared torque through many rotations.
 
-    Errors, domain and singular set are those of `minimum_acceleration_spline_so3`.
+    Errors, domain and singular set are those of `minimum_acceleration_spline`.
     Source: beyond BK 4, beyond BK 12.
 
     Parameters
     ----------
-    times, rotations, ends, inertia, long
-        As for `minimum_acceleration_spline_so3`.
+    times
+        As for `spline_velocities`.
+    poses : array_like, shape (N, 3, 3)
+        A rotation matrix for each of the times.
+    ends
+        As for `spline_velocities`.
+    body : Body
+        The body that moves.
+    long
+        As for `minimum_acceleration_spline`.
 
     Returns
     -------
@@ -118,99 +148,52 @@ def minimum_torque_spline_so3(
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> turns, book = exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]), np.diag([1.0, 2.22, 3.18])
-    >>> minimum_torque_spline_so3([0, 1, 3], turns, inertia=book).definite
+    >>> turns, book = exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]), Body(np.diag([1.0, 2.22, 3.18]))
+    >>> minimum_torque_spline([0, 1, 3], turns, body=book).definite
     True
     """
-    return _spline(times, rotations, ends, inertia, "torque", long)
+    times, rotations = _rotations(times, poses)
+    conditions = as_ends(ends, len(rotations), 3)
+    return _spline(times, rotations, conditions, as_body(body), "torque", long)
 
 
-def minimum_jerk_spline_so3(
-    times: ArrayLike, rotations: ArrayLike, ends: PathEnds = "natural", *, long: ArrayLike = False
+@described_by(spline_velocities, minimum_acceleration_spline)
+def minimum_jerk_spline(
+    times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natural", *, long: ArrayLike = False
 ) -> OptimalChain:
     """Return the curve of least jerk through many rotations.
 
-    Errors, domain and singular set are those of `minimum_acceleration_spline_so3`.
+    Errors, domain and singular set are those of `minimum_acceleration_spline`.
     Source: beyond BK 5, beyond BK 12.
 
     Parameters
     ----------
-    times, rotations, long
-        As for `minimum_acceleration_spline_so3`.
-    ends : {"natural", "periodic"} or pair of array_like, optional
-        As for `minimum_acceleration_spline_so3`, but each array has the shape (6,): the velocity,
-        followed by the acceleration.
+    times
+        As for `spline_velocities`.
+    poses : array_like, shape (N, 3, 3)
+        A rotation matrix for each of the times.
+    ends : {"natural", "rest", "periodic"} or pair of array_like, optional
+        "natural": the covariant jerk and its derivative are 0 at both ends. "rest": velocity and
+        acceleration are 0 at both ends. "periodic": they are the same at both ends. A pair gives
+        the first and the last velocity, followed by the acceleration, in arrays of shape (6,). None
+        in a pair means a natural end.
+    long
+        As for `minimum_acceleration_spline`.
 
     Returns
     -------
     OptimalChain
-        The chain with the least `jerk_cost` that was found. w, w', w'' and w''' are continuous. At
-        natural ends, the covariant jerk and its derivative are 0.
+        The chain with the least `jerk_cost` that was found. w, w', w'' and w''' are continuous.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> c = minimum_jerk_spline_so3([0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]))
+    >>> c = minimum_jerk_spline([0, 1, 3], exp_so3([[0, 0, 0], [0, 0, 1], [0, 1, 0]]))
     >>> c.jumps(3).round(8) + 0.0
     array([[0., 0., 0.]])
     """
-    return _spline(times, rotations, ends, None, "jerk", long)
-
-
-def minimum_acceleration_spline_se3(
-    times: ArrayLike,
-    poses: ArrayLike,
-    ends: PathEnds = "natural",
-    *,
-    inertia: ArrayLike | None = None,
-    mass: float = 1.0,
-    centre: ArrayLike = (0.0, 0.0, 0.0),
-    long: ArrayLike = False,
-) -> OptimalChain:
-    """Return the motion of least acceleration through many poses, for a ball or any body.
-
-    Errors, domain and singular set are those of `minimum_acceleration_spline_so3`.
-    Source: BK 6.3; beyond BK 12.
-
-    Parameters
-    ----------
-    times, poses, ends
-        As for `spline_velocities`.
-    inertia, mass, centre
-        As for `minimum_acceleration_se3`.
-    long
-        As for `minimum_acceleration_spline_so3`.
-
-    Returns
-    -------
-    OptimalChain
-        A chain of `RigidMotion` legs. The rotation is the result of
-        `minimum_acceleration_spline_so3`; the centre of mass moves on a cubic spline.
-
-    Examples
-    --------
-    >>> from rbcourse import pose_from_coordinates
-    >>> poses = pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 2, 0, 0], [0, 0, 2, 2, 2, 0]])
-    >>> c = minimum_acceleration_spline_se3([0, 2, 3], poses)
-    >>> c(2)[:3, 3].round(12), c([0, 3], 2).round(9) + 0.0
-    (array([2., 0., 0.]), array([[0., 0., 0., 0., 0., 0.],
-           [0., 0., 0., 0., 0., 0.]]))
-    """
-    r = as_single("centre", centre, 3)
-    as_positive("mass", mass)
-    times, poses, _ = checked_path(times, as_poses("poses", poses))
-    R, h, conditions = poses[:, :3, :3], np.diff(times), as_ends(ends, len(poses), 6)
-    w, v = conditions.given[:, :3], conditions.given[:, 3:]
-    turning = _spline(times, R, conditions._replace(given=w), inertia, "acceleration", long)
-    d, conditions = poses[:, :3, 3] + R @ r, conditions._replace(given=v + np.cross(w, r))
-    v = path_system(h, R, d).solve(conditions)
-    rate = matvec(R, v)
-    legs = rigid_motion(RigidMotion, turning.legs, d[:-1], d[1:], rate[:-1], rate[1:], centre=r)
-    start, end = (legs.path[:, i] - (legs.path[:, 1] - legs.path[:, 0]) for i in (2, 3))
-    moving = 4 * np.sum((start**2 + start * end + end**2) / h[:, None] ** 3)
-    velocities = np.append(turning.velocities, v - np.cross(turning.velocities, r), axis=1)
-    cost = turning.cost + mass * float(moving)
-    return replace(turning, legs=legs, velocities=velocities, cost=cost)
+    times, rotations = _rotations(times, poses)
+    return _spline(times, rotations, as_ends(ends, len(rotations), 6), Body.ball(), "jerk", long)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -220,11 +203,16 @@ class OptimalChain(Chain):
     Attributes
     ----------
     cost : float
-        The `acceleration_cost`, `torque_cost` or `jerk_cost`.
+        The `acceleration_cost`, `torque_cost` or `jerk_cost` for the body of the curve.
+    certified : bool
+        Whether the chain is proven to be a strict local minimum: all nearby curves through the same
+        poses with the same ends cost more (see `Optimum`).
     definite : bool
         Whether the second derivative of the cost with respect to the values at the poses is
         positive definite. This is False if a family of curves has the same cost, for example if a
         body is symmetric about the axis of all rotations.
+    c : ndarray, shape (N − 1, 3)
+        The constant R p of each leg in the fixed frame.
     residual, iterations, converged : float, int, bool
         The largest residual of the legs, and the number of steps of Newton's method. `converged` is
         always True, since a failure raises ConvergenceError.
@@ -238,104 +226,90 @@ class OptimalChain(Chain):
     converged: bool = True
 
     @property
-    def rotation(self) -> Optimum:
+    def optimum(self) -> OptimalRotation:
         """The rotations of the legs."""
         legs: Any = self.legs
-        return getattr(legs, "rotation", legs)
+        found: OptimalRotation = legs.found
+        return found
 
     @property
     def c(self) -> Array:
-        """The constant R p of each leg in the fixed frame, shape (N − 1, 3)."""
-        return self.rotation.c
+        """The constant R p of each leg."""
+        return self.optimum.c
 
     @property
     def certified(self) -> bool:
-        """Whether the chain is proven to be a strict local minimum (`is_local_minimum`)."""
-        return bool(is_local_minimum(self))
+        """Whether the chain is proven to be a strict local minimum."""
+        return bool(self.definite and self.optimum.positive.all())
 
     def lasting(self, duration: Array) -> Self:
         """Return the chain with another duration and the same start time."""
-        share = float(duration / self.duration) ** (self.rotation.functional.ends + 1)
+        share = float(duration / self.duration) ** (self.optimum.functional.ends + 1)
         return replace(super().lasting(duration), cost=self.cost / share)
 
+    def _moved(self, L: Array, X: Array) -> Chain:
+        parts = {name: getattr(self, name) for name in ("duration", "times", "legs", "velocities")}
+        return Chain(**parts, body=self.body)._moved(L, X)
 
-def is_local_minimum(curve: Optimum | OptimalChain | RigidMotion) -> NDArray[np.bool_]:
-    """Tell whether an optimum is proven to be a strict local minimum of its cost.
+    def _what(self) -> str:
+        return f"Optimum of {self.optimum.functional.name} through {len(self.times)} poses"
 
-    Source: beyond BK 15.
+    def _result(self) -> str:
+        proof = "a proven local minimum" if self.certified else "not proven to be a minimum"
+        return f", cost {self.cost:.6g}, {proof}"
 
-    Parameters
-    ----------
-    curve : Optimum, OptimalChain or RigidMotion
-        A result of one of the functions ``minimum_…`` or of `stationary_so3`; it may be a stack.
 
-    Returns
-    -------
-    ndarray of bool, shape curve.batch_shape
-        True if all nearby curves with the same ends and poses are proven to cost more. It is False
-        for a saddle, for a curve that is NaN, and if the proof fails.
-
-    Notes
-    -----
-    If R p is constant, a curve is stationary, but it may not be a minimum. This function proves
-    that the second variation is positive: it computes this quadratic form on polynomials and bounds
-    the rest (see `rbcourse.optimum._second_variation`). The proof holds up to rounding, quadrature
-    and the error of the computed curve. It does not exclude distant curves that cost less. An
-    eigenvalue below 1e-6 times the leading term counts as 0. For the acceleration of a ball and
-    times from 0 to 1, ‖c‖ < 2π³ is a sufficient condition (docs/near_optimal.md).
-
-    Examples
-    --------
-    From rest to rest, a turn of a book about the axis of its largest moment has the least torque if
-    the angle is at most about 107.9°. Beyond this angle, curves that leave the axis cost less:
-
-    >>> from rbcourse import exp_so3, minimum_torque_so3
-    >>> book, rest = np.diag([1.0, 2.22, 3.18]), [0, 0, 0]
-    >>> R1 = exp_so3([0, 0, np.radians(100)])
-    >>> bool(is_local_minimum(minimum_torque_so3(np.eye(3), R1, rest, rest, book)))
-    True
-    """
-    rotation = getattr(curve, "rotation", curve)
-    if not isinstance(rotation, Optimum):
-        raise ValueError(f"curve: an optimum is wanted, got {curve!r}")
-    found = is_positive(rotation.flat).reshape(rotation.batch_shape)
-    if isinstance(curve, OptimalChain):
-        return np.array(curve.definite and found.all())
-    return found
+def _rotations(times: ArrayLike, poses: ArrayLike) -> tuple[Array, Array]:
+    times, rotations, _ = checked_path(times, poses)
+    if rotations.shape[-1] != 3:
+        raise ValueError(f"poses: rotations, shape (N, 3, 3), are wanted, got {rotations.shape}")
+    return times, rotations
 
 
 def _spline(
-    times: ArrayLike, R: ArrayLike, ends: PathEnds | Conditions, G: Any, what: str, long: ArrayLike
+    times: Array, R: Array, ends: Conditions, body: Body, what: str, long: ArrayLike
 ) -> OptimalChain:
-    times, R, _ = checked_path(times, as_rotations("rotations", R))
-    T, R, order = np.diff(times), nearest(R)[0], 2 if what == "jerk" else 1
-    unit, way = T.mean(), np.asarray(long)
-    if way.dtype != bool or way.shape not in ((), T.shape):
-        raise ValueError(f"long: a bool for each of {len(T)} legs is wanted, got {long!r}")
-    conditions, h = as_ends(ends, len(R), 3 * order), T / unit
-    given = conditions.given * np.repeat(unit ** np.arange(1, 1 + order), 3)
-    w = quaternion_system(h, R, way).solve(conditions._replace(given=given[:, :3]))
-    legs = quaternion_cubic(Ends(R[:-1], R[1:], *(h[:, None] * [w[:-1], w[1:]])), h, way)
-    curve = np.ascontiguousarray(legs.values(grid(NODES[0]).t[:, None], 0).swapaxes(0, 1))
-    functional = Jerk() if what == "jerk" else BallAcceleration()
-    problem = Problem(R, h, conditions._replace(given=given), functional)
-    if what == "torque" or G is not None:
-        G = as_inertia("inertia", as_single("inertia", G, 3, 3))
+    """Return the optimum through rotations; `what` is "acceleration", "torque" or "jerk"."""
+    T, R = np.diff(times), nearest(R)[0]
+    unit = T.mean()
+    orders = np.arange(1, 1 + ends.given.shape[1] // 3)
+    scaled = ends._replace(given=ends.given * np.repeat(unit**orders, 3))
+    functional: Functional = Jerk() if what == "jerk" else BallAcceleration()
+    problem = Problem(R, T / unit, scaled, functional)
+    curve = _starting_curve(problem, _as_long(long, len(T)))
+    if what == "torque" or not body.is_ball:
         of_ball = solve_spline(problem, curve)
         curve = on_nodes(of_ball.R, NODES[0]) if isinstance(of_ball, Found) else curve
+        G = as_single("body.inertia", body.inertia, 3, 3)
         effort = Effort(np.broadcast_to(G, (len(T), 3, 3)), of_torque=what == "torque")
         problem = problem._replace(functional=effort)
     found = solve_spline(problem, curve)
     if isinstance(found, Failure):
         raise ConvergenceError(*found)
-    optima = optimum_of(problem.functional, problem.own(found.values), found.legs, T)
+    legs = optimum_of(problem.functional, problem.own(found.values), found.legs, T, body)
     return OptimalChain(
         duration=np.array(times[-1] - times[0]),
+        body=body,
         times=times,
-        legs=optima,
+        legs=legs,
         velocities=found.values[:, :3] / unit,
-        cost=float(np.sum(optima.cost)),
+        cost=float(np.sum(legs.cost)),
         definite=found.shift < 0,
-        residual=float(np.max(optima.residual)),
+        residual=float(np.max(legs.residual)),
         iterations=found.legs[0].iterations,
     )
+
+
+def _starting_curve(problem: Problem, long: NDArray[np.bool_]) -> Array:
+    """Return the `quaternion_spline` at the nodes of its legs."""
+    R, h, ends = problem.R, problem.h, problem.ends
+    w = quaternion_system(h, R, long).solve(ends._replace(given=ends.given[:, :3]))
+    legs = normalised_cubic(Ends(R[:-1], R[1:], h[:, None] * w[:-1], h[:, None] * w[1:]), h, long)
+    return np.ascontiguousarray(legs.values(grid(NODES[0]).t[:, None], 0).swapaxes(0, 1))
+
+
+def _as_long(long: ArrayLike, legs: int) -> NDArray[np.bool_]:
+    way = np.asarray(long)
+    if way.dtype != bool or way.shape not in ((), (legs,)):
+        raise ValueError(f"long: a bool for each of {legs} legs is wanted, got {long!r}")
+    return way

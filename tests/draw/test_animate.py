@@ -15,7 +15,7 @@ import rbcourse as rb
 from rbcourse.draw import animate, bodies, space, spheres
 
 TIMES = np.linspace(0, 1, 12)
-POSES = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1]))(TIMES)
+POSES = rb.screw(np.eye(4), rb.pose_from_coordinates([0.5, 1.0, 0.5, 3, 2, 1]))(TIMES)
 TABLE = bodies.pose_table({"t [1]": TIMES}, POSES)
 
 

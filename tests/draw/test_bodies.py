@@ -9,7 +9,7 @@ from rbcourse.draw import bodies
 
 A1 = rb.pose_from_coordinates([0.3, -0.5, 1.0, 4, 5, 3])
 TIMES = np.linspace(0, 1, 6)
-SCREW, GEODESIC = (way(np.eye(4), A1)(TIMES) for way in (rb.screw_se3, rb.geodesic_se3))
+SCREW, GEODESIC = (way(np.eye(4), A1)(TIMES) for way in (rb.screw, rb.geodesic))
 MOTIONS = {"geodesic": GEODESIC, "screw": SCREW}
 
 
@@ -87,7 +87,7 @@ def test_paths_are_drawn_with_the_frames_at_their_ends(axes):
         assert line.get_label() == name
     assert len({line.get_color() for line in lines}) == 2
     assert len({line.get_linestyle() for line in lines}) == 2
-    back = rb.screw_se3(np.eye(4), rb.inverse_se3(A1))(TIMES)
+    back = rb.screw(np.eye(4), rb.inverse_se3(A1))(TIMES)
     bodies.draw_ways(axes[1], {**MOTIONS, "back": back})
     names = [[text.get_text() for text in ax.texts if "_" in text.get_text()] for ax in axes]
     assert names == 2 * [["$x_0$", "$y_0$", "$z_0$"]]

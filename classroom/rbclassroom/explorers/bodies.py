@@ -71,9 +71,9 @@ def _solved(about: str, turn: float, thickness: float) -> Any:
     G, rest = rb.metrics.box_inertia([_LENGTH, _WIDTH, thickness / 100]), np.zeros(3)
     ends = np.eye(3), rb.exp_so3(np.radians(turn) * _AXES[about]), rest, rest
     curves: list[rb.Curve] = [
-        rb.minimum_acceleration_so3(*ends),
-        rb.minimum_acceleration_so3(*ends, G),
-        rb.minimum_torque_so3(*ends, G),
+        rb.minimum_acceleration(*ends),
+        rb.minimum_acceleration(*ends, G),
+        rb.minimum_torque(*ends, G),
     ]
     efforts = [np.linalg.norm(torques(curve, G, _TIMES), axis=-1) for curve in curves]
     costs = {name: [float(cost(c, G)) for c in curves] for name, cost in _COSTS.items()}

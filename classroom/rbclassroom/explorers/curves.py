@@ -119,7 +119,7 @@ def screw_explorer() -> Explorer:
         goal = rb.pose_from_coordinates([*(np.radians(angle) * axis), x, 0, z])
         move_box(artists["goal"], goal, _SIDE)
         poses, said = {}, {}
-        for name, curve in {"geodesic": rb.geodesic_se3, "screw": rb.screw_se3}.items():
+        for name, curve in {"geodesic": rb.geodesic, "screw": rb.screw}.items():
             way = curve(np.eye(4), goal)
             poses[name] = pose = way(t)
             artists[f"{name} way"].set_data_3d(*way(t * _TIMES)[:, :3, 3].T)
@@ -208,4 +208,4 @@ def _spins() -> tuple[rb.Array, rb.Array]:
     ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
     body = np.stack([ahead, np.cross(L, ahead), L], axis=-2)
     upright = rb.exp_so3([0, 0, AZIMUTH]) @ body  # the angular momentum points up
-    return rb.geodesic_flow(np.diag(_MOMENTS), upright, w0, _SPIN_TIMES)
+    return rb.connection.geodesic_flow(np.diag(_MOMENTS), upright, w0, _SPIN_TIMES)

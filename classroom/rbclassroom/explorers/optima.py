@@ -126,7 +126,7 @@ def _solved_rotations(rival: str, size: float, k: float) -> Solved:
     """Solve the problem of BK (21) with another size and another k."""
     sigma = size * _SIGMA
     ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
-    return _compared(rival, rb.minimum_acceleration_so3(*ends), FORMS[rival](*ends))
+    return _compared(rival, rb.minimum_acceleration(*ends), FORMS[rival](*ends))
 
 
 @lru_cache(maxsize=64)
@@ -135,8 +135,8 @@ def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
     goal = rb.pose_from_coordinates([*sigma, 8, 10, 12])
     ends = np.eye(4), goal, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
-    best = rb.minimum_acceleration_se3(*ends)
-    return _compared("projection", best, rb.projected_cubic_se3(*ends))
+    best = rb.minimum_acceleration(*ends)
+    return _compared("projection", best, rb.projected_cubic(*ends))
 
 
 def _compared(rival: str, *curves: rb.Curve) -> Solved:

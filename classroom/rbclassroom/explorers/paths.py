@@ -82,7 +82,7 @@ def spline_explorer() -> Explorer:
         rest = (np.zeros(3), np.zeros(3)) if ends == "at rest" else "natural"
         w = rb.bessel_velocities(times, R)
         w[[0, -1]] *= ends == "natural"
-        curves = rb.chain(times, R, w), rb.projected_spline_so3(times, R, rest)
+        curves = rb.chain(times, R, w), rb.projected_spline(times, R, rest)
         starts, h = times[:-1, None], np.diff(times)[:, None]
         # times on both sides of each knot
         inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()
@@ -102,7 +102,7 @@ def spline_explorer() -> Explorer:
             jumped = f"by {numbers(jumps, 2)} rad/s²" if len(jumps) else "not yet"
             said[f"{kind}: ω′ jumps"] = jumped
             costs.append(rb.acceleration_cost(curve))
-        least = rb.minimum_acceleration_spline_so3(times, R, rest).cost
+        least = rb.minimum_acceleration_spline(times, R, rest).cost
         for kind, cost in zip(KINDS, costs, strict=True):
             said[f"{kind}: cost"] = f"{numbers(cost / least, 3)} × the least"
         return said
@@ -172,12 +172,12 @@ def chain_explorer() -> Explorer:
 
 def _joined(curve: str, knots: rb.Array) -> rb.Chain:
     if curve == JOINED[0]:
-        return rb.chain(knots, POSES, leg=rb.geodesic_se3)
+        return rb.chain(knots, POSES, leg=rb.geodesic)
     if curve == JOINED[1]:
         w = rb.bessel_velocities(knots, POSES) * [[0], [1], [1], [0]]
         return rb.chain(knots, POSES, w)
     rest = np.zeros(6), np.zeros(6)
-    spline = rb.projected_spline_se3 if curve == JOINED[2] else rb.minimum_acceleration_spline_se3
+    spline = rb.projected_spline if curve == JOINED[2] else rb.minimum_acceleration_spline
     return spline(knots, POSES, rest)
 
 

@@ -142,7 +142,7 @@ def projection_explorer() -> Explorer:
 def _gram_schmidt(M: rb.Array) -> tuple[rb.Array, str]:
     """Return the Gram–Schmidt result for M and, if it is not a rotation, the reason."""
     try:
-        G = rb.orthonormalize_gram_schmidt(M)
+        G = rb.projection.orthonormalize_gram_schmidt(M)
     except ValueError:
         return np.zeros((3, 3)), "none: M is flat"
     return G, "" if np.linalg.det(G) > 0 else "a mirror"

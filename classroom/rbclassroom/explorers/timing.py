@@ -28,7 +28,7 @@ def timing_explorer() -> Explorer:
     ``angular_speed`` of the box, the largest ``speed`` and ``acceleration`` of its centre, and
     ``t``, the time as a fraction of the duration, which the play button moves (beyond BK 16).
     """
-    path = rb.projected_spline_se3(np.arange(4.0), POSES)
+    path = rb.projected_spline(np.arange(4.0), POSES)
     with new_figure() as fig:
         space = new_space(fig, (-0.075, 0.03, 0.55, 0.89), 2.4)
         artists: dict[str, Any] = {

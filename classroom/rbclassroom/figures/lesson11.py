@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbclassroom.figures import columns
-from rbcourse import Array, Curve, Ends, angle_between, exp_so3, geodesic_so3, sample_rotation
+from rbcourse import Array, Curve, Ends, angle_between, exp_so3, geodesic, sample_rotation
 from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 from rbcourse.sampling import Rng
@@ -38,7 +38,7 @@ def moving_casteljau(
 
     The first axes show the construction in the plane, with the four control `points`, shape (4, 2).
     The second axes, in space, show the construction on SO(3). Its control points are those of
-    `bezier_so3` for the `ends` R0, R1, w0, w1. Each rotation is shown as the image of v on the unit
+    `closed_forms.bezier` for the `ends` R0, R1, w0, w1. Each rotation is shown as the image of v on the unit
     sphere; choose v such that all images are in front.
 
     ``update(i)`` divides all legs at the fraction t[i] and joins the new points by legs, until a
@@ -124,7 +124,7 @@ def _construct(
 
 
 def _on_geodesic(first: Array, last: Array, t: Array) -> Array:
-    return geodesic_so3(first, last).at_own_times(np.tile(t[:, None], first.shape[1]))
+    return geodesic(first, last).at_own_times(np.tile(t[:, None], first.shape[1]))
 
 
 def defects(make: Callable[..., Curve], ends: Ends, *, rng: Rng = None) -> dict[str, float]:

@@ -93,7 +93,7 @@ def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
     The motions start at I with the angular velocities w, shape (motions, 3). For each motion, the
     columns have the x and y components of three curves at the times t: the straight line t w, the
     logarithm, and the normal coordinates. The normal coordinates are exact to second order, as in
-    `normal_cubic_so3`.
+    `closed_forms.normal_cubic`.
     """
     R, _ = geodesic_flow(inertia, np.eye(3), w, t)
     rest = np.zeros(3)

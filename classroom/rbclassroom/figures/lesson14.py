@@ -161,12 +161,11 @@ def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
             ends, scipys = (w[0], w[-1]), RotationSpline(times, Rotation.from_matrix(R))
             curves = (
                 rb.chain(times, R, w),
-                rb.projected_spline_so3(times, R, ends),
-                rb.quaternion_spline_so3(times, R, ends),
+                rb.projected_spline(times, R, ends),
+                rb.quaternion_spline(times, R, ends),
             )
             best, other = (
-                rb.minimum_acceleration_spline_so3(times, R, x).cost
-                for x in (ends, scipys([0, 9], 1))
+                rb.minimum_acceleration_spline(times, R, x).cost for x in (ends, scipys([0, 9], 1))
             )
             squares = np.sum(scipys(within.ravel(), 2) ** 2, axis=-1).reshape(within.shape)
             cost = np.sum(squares @ weights)  # 2 from the metric, ½ from the length of a leg

@@ -131,8 +131,8 @@ def start() -> Paths:
     R0, R1, rest = np.eye(3), rb.exp_so3([0, 0, np.pi / 2]), np.zeros(3)
     t, axes = np.linspace(0, 0.5, 6), (60, 600, 1080, 137.6)
     found = {
-        "projection": rb.projected_cubic_so3(R0, R1, rest, rest),
-        "optimum": rb.minimum_acceleration_so3(R0, R1, rest, rest),
+        "projection": rb.projected_cubic(R0, R1, rest, rest),
+        "optimum": rb.minimum_acceleration(R0, R1, rest, rest),
     }
     return {
         f"start-{name}": graph(axes, t, curve(t, 1)[:, 2], curve(t, 2)[:, 2])
@@ -145,8 +145,8 @@ def angles() -> Paths:
     R0, R1, rest = np.eye(3), rb.exp_so3([0, 0, np.radians(150)]), np.zeros(3)
     t, axes = np.linspace(0, 1, 9), (70, 600, 510, 154)
     found = {
-        "cayley": rb.cayley_cubic_so3(R0, R1, rest, rest),
-        "exponential": rb.exponential_cubic_so3(R0, R1, rest, rest),
+        "cayley": rb.closed_forms.cayley_cubic(R0, R1, rest, rest),
+        "exponential": rb.closed_forms.exponential_cubic(R0, R1, rest, rest),
     }
     return {
         f"angles-{name}": graph(axes, t, rb.angle_between(R0, curve(t)), curve(t, 1)[:, 2])
@@ -182,7 +182,7 @@ def onerate() -> Paths:
         [0.8, 0.4, 1.8, 1.1, -0.2, 0.0],
         [0.0, 0.6, 2.8, 1.4, 1.0, 1.0],
     ]
-    path = rb.projected_spline_se3(np.arange(4.0), rb.pose_from_coordinates(coordinates))
+    path = rb.projected_spline(np.arange(4.0), rb.pose_from_coordinates(coordinates))
     s = np.linspace(0, 3, 121)
     size = np.linalg.norm(path(s, 2)[:, 3:], axis=1)
     points = np.stack([70 + 178 * s, 570 - 370 * size / size.max()], axis=1)

@@ -50,11 +50,11 @@ def test_random_problems_are_uniform_in_balls():
 @pytest.mark.parametrize("inertia", [None, BOOK], ids=["ball", "book"])
 def test_a_survey_has_the_optimum_and_the_cost_of_every_curve(inertia):
     sharp = rb.Ends(np.eye(3)[None], rb.exp_so3([[0, 0, np.radians(179.8)]]), *np.zeros((2, 1, 3)))
-    assert rb.projected_cubic_so3(*sharp).margin < 0.004
+    assert rb.projected_cubic(*sharp).margin < 0.004
     few = rb.Ends(*map(np.concatenate, zip(sharp, SOME.take(slice(20)), strict=True)))
-    found, best = atlas.survey(few, inertia=inertia), rb.minimum_acceleration_so3(*few, inertia)
+    found, best = atlas.survey(few, inertia=inertia), rb.minimum_acceleration(*few, inertia)
     assert found.pop("optimum") == pytest.approx(best.cost, rel=1e-12)
-    of_body = {"weighted": rb.weighted_cubic_so3, "normal": rb.normal_cubic_so3}
+    of_body = {"weighted": rb.weighted_cubic_so3, "normal": rb.closed_forms.normal_cubic}
     makers = FORMS | {way: partial(make, inertia=inertia) for way, make in of_body.items()}
     assert set(found) == set(FORMS if inertia is None else makers)
     for way, cost in found.items():
@@ -64,7 +64,11 @@ def test_a_survey_has_the_optimum_and_the_cost_of_every_curve(inertia):
 
 def test_every_executor_gives_the_same_bytes(monkeypatch, capsys):
     monkeypatch.setattr(atlas, "CHUNK", 5)
-    few, known, found = SOME.take(slice(15)), {"inertia": BOOK, "ways": {"z": rb.bezier_so3}}, []
+    few, known, found = (
+        SOME.take(slice(15)),
+        {"inertia": BOOK, "ways": {"z": rb.closed_forms.bezier}},
+        [],
+    )
     with ThreadPoolExecutor(3) as threads:
         threads.submit = Mock(wraps=threads.submit)
         for executor in (None, threads):

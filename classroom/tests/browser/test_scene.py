@@ -37,7 +37,7 @@ def sphere(ax):
 
 def far(ax):
     """Draw cubes and a floor far from the origin, a line that leaves the picture, and a legend."""
-    poses = rb.screw_se3(np.eye(4), GOAL)(np.linspace(0, 1, 6))
+    poses = rb.screw(np.eye(4), GOAL)(np.linspace(0, 1, 6))
     poses[:, :3, 3] += [100, 3, 7]
     bodies.draw_cube_motion(ax, poses, side=1)
     ax.plot([50, 150], [-10, 20], [7, 7], color="blue", lw=3, label="a line")
@@ -130,7 +130,7 @@ def test_the_browser_cuts_and_orders_parts_as_python_does(page):
 @plt.style.context(STYLES)
 def test_buttons_and_keys_set_the_view(timed, tmp_path):
     fig, axes = plt.subplots(1, 2, dpi=80, subplot_kw={"projection": "space"})
-    motion = rb.screw_se3(np.eye(4), GOAL)(np.linspace(0, 1, 5))
+    motion = rb.screw(np.eye(4), GOAL)(np.linspace(0, 1, 5))
     update = bodies.moving_boxes(axes, {"one": motion, "other": motion}, edges=1)
     player = animate.animate(fig, "player", "Two cubes.", update, 5, still=0)
     plt.close(fig)

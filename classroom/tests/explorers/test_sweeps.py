@@ -111,8 +111,8 @@ def turned_books(about, turn, thickness):
     G = rb.metrics.box_inertia([0.3, 0.2, thickness / 100])
     goal = rb.exp_so3(np.radians(turn) * axis / np.linalg.norm(axis))
     ends = np.eye(3), goal, np.zeros(3), np.zeros(3)
-    curves = [rb.minimum_acceleration_so3(*ends, *inertia) for inertia in ((), (G,))]
-    curves.append(rb.minimum_torque_so3(*ends, G))
+    curves = [rb.minimum_acceleration(*ends, *inertia) for inertia in ((), (G,))]
+    curves.append(rb.minimum_torque(*ends, G))
     costs = np.array([[f(c, G) for c in curves] for f in (rb.acceleration_cost, rb.torque_cost)])
     return curves, G, costs / costs.min(axis=1, keepdims=True)
 
@@ -209,7 +209,7 @@ def spun(axis, tilt):
     x, y, _ = start @ [0.8, 0.8, 1]
     start = rb.exp_so3([0, 0, np.radians(-60) - np.arctan2(y, x)]) @ start
     times = np.linspace(0, 8, 201)
-    return times, *rb.geodesic_flow(np.diag(MOMENTS), start, w0, times)
+    return times, *rb.connection.geodesic_flow(np.diag(MOMENTS), start, w0, times)
 
 
 @pytest.mark.source("BK (8)")
@@ -279,7 +279,7 @@ def test_the_optimum_and_its_rivals_agree_with_the_package():
     for v, said, artists in sweep("minimum_acceleration", k=3.0):
         sigma = v["size"] * np.pi / 6 * np.array([1, 2, 3])
         ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + v["k"] * np.eye(3)[0]
-        curves, costs = solved(rb.minimum_acceleration_so3, RIVALS[v["rival"]], ends)
+        curves, costs = solved(rb.minimum_acceleration, RIVALS[v["rival"]], ends)
         assert_compared(said, curves, costs, TIMES, v["rival"])
         for name, curve in zip(("optimum", "rival"), curves, strict=True):
             drawn = np.transpose([points(artists[f"{name} {axis}"])[:, 1] for axis in "xyz"])
@@ -301,7 +301,7 @@ def test_both_cubes_agree_with_the_package():
         sigma = v["turn"] * np.pi / 6 * np.array([1, 4, 3])
         A1 = rb.pose_from_coordinates([*sigma, 8, 10, 12])
         ends = np.eye(4), A1, [1, 2, 3], [2, 1, v["spin"]], [1, 1, 1], [1, 5, v["rise"]]
-        curves, costs = solved(rb.minimum_acceleration_se3, rb.projected_cubic_se3, ends)
+        curves, costs = solved(rb.minimum_acceleration, rb.projected_cubic, ends)
         assert_compared(said, curves, costs, v["t"])
         under = artists["difference name"].get_position_3d()
         assert off(under, curves[0](v["t"])[:3, 3] - [0, 0, 3.6]) < 1e-11
@@ -327,14 +327,14 @@ def curve_of(name, knots):
     """Return the named curve through the four poses of the explorer."""
     rest = np.zeros((2, 6))
     if name == "geodesics":
-        return rb.chain(knots, POSES, leg=rb.geodesic_se3)
+        return rb.chain(knots, POSES, leg=rb.geodesic)
     if name == "cubics, parabolas":
         velocities = rb.bessel_velocities(knots, POSES)
         velocities[[0, -1]] = 0
         return rb.chain(knots, POSES, velocities)
     if name == "cubics, spline":
         return rb.chain(knots, POSES)
-    return rb.minimum_acceleration_spline_se3(knots, POSES, tuple(rest))
+    return rb.minimum_acceleration_spline(knots, POSES, tuple(rest))
 
 
 def test_the_box_follows_the_chain():
@@ -377,7 +377,7 @@ def test_both_curves_pass_through_the_orientations():
         if v["ends"] == "at rest":
             ends, w["parabolas"][[0, -1]] = (np.zeros(3), np.zeros(3)), 0
         w["spline"] = rb.spline_velocities(times, R, ends)
-        least = rb.minimum_acceleration_spline_so3(times, R, ends).cost
+        least = rb.minimum_acceleration_spline(times, R, ends).cost
         for kind, velocities in w.items():
             c = rb.chain(times, R, velocities)
             path, curve = points(artists[f"{kind} path"]), points(artists[f"{kind} ‖ω′‖"])
@@ -402,7 +402,7 @@ def test_both_curves_pass_through_the_orientations():
 
 @pytest.mark.source("beyond BK 16")
 def test_the_timing_stays_below_the_limits_of_its_path():
-    path = rb.projected_spline_se3(np.arange(4.0), POSES)
+    path = rb.projected_spline(np.arange(4.0), POSES)
     fastest, s = cache(partial(rb.fastest, path)), np.linspace(0, 3, 241)
     V, A = path(s, 1), path(s, 2)[:, 3:]
     turned, moved = (np.linalg.norm(part, axis=1) for part in (V[:, :3], V[:, 3:]))
@@ -418,7 +418,7 @@ def test_the_timing_stays_below_the_limits_of_its_path():
         assert off(highest**2 * bend / v["acceleration"], 1) < 1e-9
         rate = points(artists["one rate"])[0, 1]
         assert rate - 0.11 < artists["one rate name"].get_position()[1] < max(rate, 0.1)
-        used = rb.limits_used(rb.retime(path, 3 / rate), **limits).values()
+        used = rb.limits_used(path.retimed(3 / rate), **limits).values()
         assert max(share for share, _ in used) == pytest.approx(1)
         now = v["t"] * c.domain[1]
         assert off(points(artists["now"]), c.progress(now)[:2]) < 1e-12

@@ -285,7 +285,7 @@ def test_profiles_show_the_times_of_poses():
 
 def test_profiles_agree_with_the_motion():
     poses = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0, 0, 1, 3, 4, 0], [0, 0, 1, 3, 4, 5]])
-    table = lesson14.profile_table(rb.chain([0, 2, 4], poses, leg=rb.geodesic_se3), 1, 5)
+    table = lesson14.profile_table(rb.chain([0, 2, 4], poses, leg=rb.geodesic), 1, 5)
     assert table["t [s]"].tolist() == [0, 1, 2, 3, 4]
     assert np.allclose(table["angular speed [rad/s]"], [0.5, 0.5, 0, 0, 0], atol=1e-14)
     assert np.allclose(table["speed [m/s]"], 2.5, atol=1e-14)
@@ -297,7 +297,7 @@ def test_profiles_agree_with_the_motion():
             w_dot = (smooth(t + h, 1) - smooth(t - h, 1))[:3] / (2 * h)
             assert w == pytest.approx(np.linalg.norm(w_dot), abs=1e-6)
     with pytest.raises(ValueError, match=r"^motion: a single curve on SE\(3\) is wanted"):
-        lesson14.profile_table(rb.geodesic_so3(np.eye(3), np.eye(3)), 1)
+        lesson14.profile_table(rb.geodesic(np.eye(3), np.eye(3)), 1)
 
 
 @pytest.mark.source("beyond BK 7")
@@ -350,7 +350,7 @@ def test_the_turns_are_natural_splines_through_the_angles():
 def test_limit_curves_are_the_largest_admissible_rates():
     """The test tries many changes of the rate at each place."""
     poses = np.eye(4), rb.pose_from_coordinates([1, 0, 1, 2, 1, 0])
-    path = rb.minimum_acceleration_se3(*poses, [0, 1, 0], [1, 0, 0], [1, 0, 0], [0, 2, 1])
+    path = rb.minimum_acceleration(*poses, [0, 1, 0], [1, 0, 0], [1, 0, 0], [0, 2, 1])
     limits = {"speed": 1.5, "angular_speed": 0.7, "acceleration": 2.0, "angular_acceleration": 1.0}
     s = np.linspace(0, 1, 9)
     found = lesson15.highest_rates(path, s, limits)
@@ -375,7 +375,7 @@ def test_two_passes_give_the_largest_squared_rates_below_all_limits():
 
 
 def test_a_used_share_is_a_norm_divided_by_its_limit():
-    path = rb.screw_se3(np.eye(4), rb.pose_from_coordinates([0, 0, 2, 3, 0, 0]))
+    path = rb.screw(np.eye(4), rb.pose_from_coordinates([0, 0, 2, 3, 0, 0]))
     data = lesson15.share_table(path, {"angular_speed": 4.0, "speed": 5.0})
     assert data["angular speed [1]"] == pytest.approx(0.5)
     assert data["speed [1]"] == pytest.approx(np.linalg.norm(path(0, 1)[3:]) / 5, abs=5e-5)

@@ -8,19 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import BLOCK, Array, blocks, cross
-from rbcourse.curves.curve import (
-    Curve,
-    Ends,
-    check_defined,
-    least_over_time,
-    near_margins,
-    with_inertia,
-)
-from rbcourse.metrics import weight_of
+from rbcourse.body import Body, weight_of
+from rbcourse.curves.curve import Curve, check_defined, least_over_time, near_margins
+from rbcourse.curves.ends import Ends, between
+from rbcourse.curves.rigid import moving
 from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singular
 from rbcourse.so3 import hat
 
@@ -105,30 +99,45 @@ class ProjectedPolynomial(Curve):
         return near_margins(super().breakpoints, *doubtful._least_gap)
 
 
-def projected_cubic_so3(
-    R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike, *, duration: ArrayLike = 1.0
-) -> ProjectedPolynomial:
+def projected_cubic(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    body: Body | None = None,
+    duration: ArrayLike = 1.0,
+) -> Curve:
     """Return the projected cubic with these ends, which is near-optimal for minimum acceleration.
 
-    Source: BK 6.2, BK Prop. 3; with M'(1) where the paper prints the second derivative.
+    Source: BK 6.2, BK 6.3, BK Prop. 3, BK Prop. 5; with M'(1) where the paper prints the second
+    derivative. For other bodies than a ball, beyond BK 6.
 
     Parameters
     ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        Rotation matrices, and angular velocities in the body frame, at the start and at the end.
+    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
+        Rotation matrices, or poses.
+    v0, v1 : array_like, shape (..., 3) or (..., 6), optional
+        The velocities at both ends in the body frame: angular velocities w for rotations, twists
+        (ω, v) for poses. The default is rest. `twist_from_rates` makes twists of ω and ḋ.
+    body : Body, optional
+        The body that moves, by default the ball of metric (12). Each principal moment is at most
+        the sum of the other two, as for every real body.
     duration : array_like, shape (...), optional
         The duration of the motion; velocities are per unit of this time.
 
     Returns
     -------
-    ProjectedPolynomial
-        A `Curve` with the attribute ``margin``. It consists of the nearest rotations to the cubic
-        M(t) that has the values R and the derivatives R ŵ at both ends. It meets all four boundary
-        conditions exactly.
+    Curve
+        A curve with the attribute ``margin``. For rotations, it consists of the nearest rotations
+        to the cubic M(t) that has the values R and the derivatives R ŵ at both ends; for a body,
+        they are nearest in its metric (`project_so_weighted`, with the weight of
+        `weight_from_inertia`). For poses, this is the ``rotation``, and the centre of mass moves on
+        a cubic, which is its optimal path. The curve meets all boundary conditions exactly.
 
     See Also
     --------
-    rbcourse.textbook.projected_cubic_so3 : A short version for a single curve.
+    rbcourse.textbook.projected_cubic : A short version for a single curve.
 
     Notes
     -----
@@ -137,140 +146,92 @@ def projected_cubic_so3(
     ``margin`` below 1e-6 gives a RuntimeWarning that names the time. If ``margin`` is small, the
     curve turns by up to π in a time of about ``margin`` divided by the speed of M. At each time,
     the error of the curve is a few eps ‖M‖ divided by the sum of the two eigenvalues. The errors of
-    its first two derivatives are a few eps divided by the square and the cube of this sum.
+    its first two derivatives are a few eps divided by the square and the cube of this sum. For a
+    body, M W takes the place of M, where the weight W is scaled to have trace 3.
+
     The curve does not depend on the choice of frames: the ends L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 give
-    the curve L R(t) Q. The optimum is `minimum_acceleration_so3`. For the inertia of a body, see
-    `weighted_cubic_so3`.
+    the curve L R(t) Q (and the inertia Qᵀ G Q). The optimum is `minimum_acceleration`. If the
+    excursion is multiplied by s, the relative excess over this optimum is multiplied by about s⁴.
+    For large excursions, the excess may be large.
 
     Examples
     --------
-    >>> from rbcourse import exp_so3
-    >>> c = projected_cubic_so3(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])  # from rest
+    >>> from rbcourse import Body, exp_so3, pose_from_coordinates
+    >>> c = projected_cubic(np.eye(3), exp_so3([0, 0, 1.5]), v1=[0, 1, 0])  # from rest
     >>> c(1, 1).round(12) + 0.0, float(c.margin.round(3))
     (array([0., 1., 0.]), 1.464)
+    >>> book = Body([[1, 0, 0], [0, 2.22, 0], [0, 0, 3.18]])
+    >>> c = projected_cubic(np.eye(4), pose_from_coordinates([0, 0, 1, 2, 0, 0]), body=book)
+    >>> c(0.5, 1).round(3)[[2, 3, 4]]  # turn, forward, to the left
+    array([ 1.639,  2.633, -1.438])
     """
-    return watched(projected_cubic(*Ends(R0, R1, w0, w1).over(duration)))
+    given = between(start, goal, v0, v1, body=body, duration=duration)
+    curve = polynomial(given.ends, given.duration)
+    if not given.body.is_ball:
+        W = weight_of("body.inertia", given.body.inertia)
+        W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
+        curve = replace(curve, ends=curve.ends @ W[..., None, :, :], body=given.body)
+    return moving(given, watched(curve))
 
 
-def weighted_cubic_so3(
-    R0: ArrayLike,
-    R1: ArrayLike,
-    w0: ArrayLike,
-    w1: ArrayLike,
-    inertia: ArrayLike,
+def projected_quintic(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    a0: ArrayLike | None = None,
+    a1: ArrayLike | None = None,
     *,
     duration: ArrayLike = 1.0,
-) -> ProjectedPolynomial:
-    """Return the cubic with these ends, projected in the metric of a body's inertia.
-
-    Source: BK 6.2, BK Prop. 3; beyond BK 6: the paper leaves such metrics to a later publication.
-
-    Parameters
-    ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`.
-    inertia : array_like, shape (..., 3, 3)
-        As for `minimum_acceleration_so3`. Each principal moment is at most the sum of the other
-        two.
-
-    Returns
-    -------
-    ProjectedPolynomial
-        The cubic of `projected_cubic_so3`, projected by `project_so_weighted` with the weight W of
-        `weight_from_inertia`. It meets all four boundary conditions. The ``margin`` is the margin
-        of M W, where W is scaled to have trace 3.
-
-    Notes
-    -----
-    The curve is near-optimal for small excursions: if the excursion is multiplied by s, the
-    relative excess over the optimum is multiplied by about s⁴ (s² for `projected_cubic_so3`). For
-    large excursions, the excess may be large. `normal_cubic_so3` is a closed form for any inertia.
-    If G is a multiple of I, the curve is `projected_cubic_so3`. The singular set, the warning and
-    the symmetries are as for `projected_cubic_so3`, with M W in place of M; a change of frames maps
-    G to Qᵀ G Q.
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3
-    >>> R1, rest, book = exp_so3([0.5, 0.3, 0]), [0, 0, 0], np.diag([1.0, 2.22, 3.18])
-    >>> weighted_cubic_so3(np.eye(3), R1, rest, [0, 1, 0], book)(1, 1).round(12) + 0.0
-    array([0., 1., 0.])
-    """
-    ends, G = with_inertia(Ends(R0, R1, w0, w1), inertia)
-    curve = projected_cubic(*ends.over(duration))
-    W = weight_of("inertia", G)
-    W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
-    W = np.broadcast_to(W, (*curve.batch_shape, 3, 3))
-    return watched(replace(curve, ends=curve.ends @ W[..., None, :, :]))
-
-
-def projected_quintic_so3(
-    R0: ArrayLike,
-    R1: ArrayLike,
-    w0: ArrayLike,
-    w1: ArrayLike,
-    a0: ArrayLike,
-    a1: ArrayLike,
-    *,
-    duration: ArrayLike = 1.0,
-) -> ProjectedPolynomial:
+) -> Curve:
     """Return the projected quintic with these ends, which include accelerations.
 
     Source: BK 6, BK Prop. 3.
 
     Parameters
     ----------
-    R0, R1, w0, w1, duration
-        As for `projected_cubic_so3`.
-    a0, a1 : array_like, shape (..., 3)
-        Angular accelerations w' at both ends in the body frame, in rad per unit time squared.
+    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
+        Rotation matrices, or poses.
+    v0, v1 : array_like, shape (..., 3) or (..., 6), optional
+        Angular velocities w, or twists (ω, v), at both ends, in the body frame. The default is
+        rest.
+    a0, a1 : array_like, shape (..., 3) or (..., 6), optional
+        Accelerations at both ends as ``c(t, 2)`` returns them: w', or (w', Rᵀ d''), per unit time
+        squared. The default is 0.
+    duration : array_like, shape (...), optional
+        The duration of the motion.
 
     Returns
     -------
-    ProjectedPolynomial
-        A `Curve` with the attribute ``margin``. It consists of the nearest rotations to the quintic
-        M(t) that has the values R, the first derivatives R ŵ and the second derivatives R (ŵ² + â)
-        at both ends. It meets all six boundary conditions exactly.
+    Curve
+        A curve with the attribute ``margin``. For rotations, it consists of the nearest rotations
+        to the quintic M(t) that has the values R, the first derivatives R ŵ and the second
+        derivatives R (ŵ² + â) at both ends. For poses, this is the ``rotation``, and the origin
+        moves on a quintic. The curve meets all boundary conditions exactly.
 
     Notes
     -----
-    In general, this curve is not near the curve of least jerk, `minimum_jerk_so3`. From rest to
-    rest, it costs 1.17 times the optimum for a turn by 60°, and 11.6 times the optimum for 120°.
-    `exponential_quintic_so3` is near the optimum. The singular set and the symmetries are as for
-    `projected_cubic_so3`.
+    In general, this curve is not near the curve of least jerk, `minimum_jerk`. From rest to rest,
+    it costs 1.17 times the optimum for a turn by 60°, and 11.6 times the optimum for 120°.
+    `closed_forms.exponential_quintic` is near the optimum. The singular set and the symmetries are
+    as for `projected_cubic`.
 
     Examples
     --------
     >>> from rbcourse import exp_so3
-    >>> R1, rest = exp_so3([0, 0, 1.5]), [0, 0, 0]
-    >>> projected_quintic_so3(np.eye(3), R1, rest, rest, rest, [0, 0, 2])(1, 2).round(12) + 0.0
+    >>> c = projected_quintic(np.eye(3), exp_so3([0, 0, 1.5]), a1=[0, 0, 2])  # from rest to rest
+    >>> c(1, 2).round(12) + 0.0
     array([0., 0., 2.])
     """
-    ends, a0, a1, T = ends_of_quintic(R0, R1, w0, w1, a0, a1, duration)
-    (R0, R1, w0, w1), W0, W1 = ends, hat(ends.w0), hat(ends.w1)
+    given = between(start, goal, v0, v1, a0, a1, duration=duration)
+    (R0, R1, w0, w1), (a0, a1) = given.ends, given.bends
+    W0, W1 = hat(w0), hat(w1)
     curvatures = R0 @ (W0 @ W0 + hat(a0)), R1 @ (W1 @ W1 + hat(a1))
     M = np.stack([R0, R1, R0 @ W0, R1 @ W1, *curvatures], axis=-3)
-    return watched(ProjectedPolynomial(ends=M, duration=T))
+    return moving(given, watched(ProjectedPolynomial(ends=M, duration=given.duration)))
 
 
-def ends_of_quintic(
-    R0: ArrayLike,
-    R1: ArrayLike,
-    w0: ArrayLike,
-    w1: ArrayLike,
-    a0: ArrayLike,
-    a1: ArrayLike,
-    duration: ArrayLike,
-) -> tuple[Ends, Array, Array, Array]:
-    """Return `Ends`, a0 and a1, all rescaled to unit time, and the duration."""
-    ends, a0, a1 = Ends(R0, R1, w0, w1), as_finite("a0", a0, 3), as_finite("a1", a1, 3)
-    batch = check_broadcast(ends=(ends.R0, 2), a0=(a0, 1), a1=(a1, 1))
-    ends, T = ends.broadcast_to(batch).over(duration)
-    a0, a1 = (np.broadcast_to(T[..., None] ** 2 * a, (*T.shape, 3)) for a in (a0, a1))
-    return ends, a0, a1, T
-
-
-def projected_cubic(ends: Ends, duration: Array) -> ProjectedPolynomial:
+def polynomial(ends: Ends, duration: Array) -> ProjectedPolynomial:
     """Return the projected cubic for ends rescaled to unit time, without a warning."""
     R0, R1, w0, w1 = ends
     M = np.stack([R0, R1, R0 @ hat(w0), R1 @ hat(w1)], axis=-3)

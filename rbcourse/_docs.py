@@ -1,0 +1,48 @@
+"""Docstrings that share the descriptions of parameters.
+
+In the source, an entry "As for `f`." takes the place of a description that the function f has. When
+the module is imported, the description is copied, so that `help` of each function is complete.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from inspect import cleandoc
+from typing import Any, TypeVar
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+_SECTION = re.compile(r"^Parameters\n-+\n(.*?)(?=^\S[^\n]*\n-+\n|\Z)", re.MULTILINE | re.DOTALL)
+_ENTRY = re.compile(r"^(\S[^\n]*)\n((?:[ ]+[^\n]*\n|\n)*)", re.MULTILINE)
+
+
+def described_by(*sources: Callable[..., Any]) -> Callable[[Function], Function]:
+    """Return a decorator that copies the descriptions of parameters from other functions."""
+
+    def complete(function: Function) -> Function:
+        if function.__doc__ is None:  # python -OO
+            return function
+        known = {
+            name: entry for one in sources for entry in _entries(one) for name in _names(entry)
+        }
+        text = cleandoc(function.__doc__) + "\n"
+        for entry in _entries(function):
+            if re.search(r"\n\s+As for ", entry):
+                copied = dict.fromkeys(known[name] for name in _names(entry))
+                text = text.replace(entry, "".join(copied))
+        function.__doc__ = text
+        return function
+
+    return complete
+
+
+def _entries(function: Callable[..., Any]) -> list[str]:
+    """Return the entries of the section "Parameters" of a docstring."""
+    found = _SECTION.search(cleandoc(function.__doc__ or "") + "\n")
+    if found is None:
+        return []
+    return [f"{head}\n{text.rstrip()}\n" for head, text in _ENTRY.findall(found[1])]
+
+
+def _names(entry: str) -> list[str]:
+    return [name.strip(" *") for name in entry.split("\n")[0].split(" : ")[0].split(",")]

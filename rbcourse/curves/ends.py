@@ -1,0 +1,189 @@
+"""Boundary conditions of curves: rotations or poses, and velocities, at both ends."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._checks import as_array, as_duration, as_finite, check_all, check_broadcast
+from rbcourse._numerics import Array, cross, matvec
+from rbcourse._valid import as_rotations, as_rotations_or_poses
+from rbcourse.body import Body
+
+
+class _Ends(NamedTuple):
+    R0: Array
+    R1: Array
+    w0: Array
+    w1: Array
+
+
+class Ends(_Ends):
+    """Boundary conditions: rotations and angular velocities at both ends, in a common batch shape.
+
+    `Ends` is a tuple, so that ``make(*ends)`` calls a function ``make`` with these arguments.
+    Source: BK 6.2.
+
+    Parameters
+    ----------
+    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
+        Rotation matrices and angular velocities.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> ends = Ends(np.eye(3), exp_so3([[0, 0, 1], [0, 0, 1.5]]), [0, 0, 0], [0, 1, 0])
+    >>> ends.w1.shape
+    (2, 3)
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Self:
+        """Check the arguments, and broadcast them to a common batch shape."""
+        R0 = as_rotations("R0", R0)
+        R1 = as_rotations("R1", R1)
+        w0 = as_finite("w0", w0, 3)
+        w1 = as_finite("w1", w1, 3)
+        batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
+        return cls._make((R0, R1, w0, w1)).broadcast_to(batch)
+
+    @property
+    def turn(self) -> Array:
+        """The rotation R0ᵀ R1 from the start to the end."""
+        return np.swapaxes(self.R0, -1, -2) @ self.R1
+
+    def over(self, duration: ArrayLike) -> tuple[Self, Array]:
+        """Return the ends rescaled to unit time, and the durations, in a common batch shape."""
+        T = as_duration("duration", duration)
+        batch = check_broadcast(ends=(self.R0, 2), duration=(T, 0))
+        T, (R0, R1, w0, w1) = np.broadcast_to(T, batch), self.broadcast_to(batch)
+        return type(self)._make((R0, R1, T[..., None] * w0, T[..., None] * w1)), T
+
+    def flat(self) -> Self:
+        """Return the ends with a single batch axis."""
+        return type(self)._make(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self)
+
+    def broadcast_to(self, batch: tuple[int, ...]) -> Self:
+        """Return the ends, broadcast to another batch shape."""
+        shapes = (3, 3), (3, 3), (3,), (3,)
+        arrays = zip(self, shapes, strict=True)
+        return type(self)._make(np.broadcast_to(x, (*batch, *shape)) for x, shape in arrays)
+
+    def take(self, index: Any) -> Self:
+        """Return the ends that a NumPy index into the batch axes selects."""
+        return type(self)._make(x[index] for x in self)
+
+
+class Given(NamedTuple):
+    """Checked boundary conditions of a curve between two rotations or poses, for times from 0 to 1.
+
+    For poses, `path` contains the positions of the centre of mass at both ends, its velocities and,
+    if accelerations are given, its accelerations, in the fixed frame. For rotations, it is empty.
+    All arrays have the batch shape of the durations.
+    """
+
+    ends: Ends
+    duration: Array
+    body: Body
+    path: tuple[Array, ...] = ()
+    bends: tuple[Array, ...] = ()  # the angular accelerations at both ends, if they are given
+
+
+def between(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *accelerations: ArrayLike | None,
+    body: Body | None = None,
+    duration: ArrayLike = 1.0,
+) -> Given:
+    """Check boundary conditions; velocities and accelerations that are None are 0."""
+    start, size = as_rotations_or_poses("start", start)
+    goal, size_of_goal = as_rotations_or_poses("goal", goal)
+    if size != size_of_goal:
+        raise ValueError(
+            "start, goal: two rotations or two poses are wanted, got shapes "
+            f"{start.shape} and {goal.shape}"
+        )
+    names = "v0", "v1", "a0", "a1"
+    given = zip(names, (v0, v1, *accelerations), strict=False)
+    rates = {name: _as_rate(name, value, size) for name, value in given}
+    body, T = as_body(body), as_duration("duration", duration)
+    batch = check_broadcast(
+        start=(start, 2),
+        goal=(goal, 2),
+        duration=(T, 0),
+        body=(body.inertia, 2),
+        **{name: (rate, 1) for name, rate in rates.items()},
+    )
+    T = np.broadcast_to(T, batch)
+    R0, R1 = (np.broadcast_to(A[..., :3, :3], (*batch, 3, 3)) for A in (start, goal))
+    scaled = [
+        np.broadcast_to(T[..., None] ** (1 + i // 2) * rate, (*batch, size))
+        for i, rate in enumerate(rates.values())
+    ]
+    turning = [rate[..., :3] for rate in scaled]
+    ends = Ends._make((R0, R1, *turning[:2]))
+    if size == 3:
+        return Given(ends, T, body, bends=tuple(turning[2:]))
+    positions = (
+        np.broadcast_to(A[..., :3, 3] + matvec(A[..., :3, :3], body.centre), (*batch, 3))
+        for A in (start, goal)
+    )
+    moving = at_centre(body.centre, scaled[::2]), at_centre(body.centre, scaled[1::2])
+    path = [
+        matvec(R, rate)
+        for pair in zip(*moving, strict=True)
+        for R, rate in zip((R0, R1), pair, strict=True)
+    ]
+    return Given(ends, T, body, (*positions, *path), tuple(turning[2:]))
+
+
+def on_rotations(given: Given, what: str) -> Given:
+    """Return the boundary conditions; refuse poses."""
+    if given.path:
+        raise ValueError(f"start, goal: {what} is defined for rotations, got poses")
+    return given
+
+
+def as_body(body: Body | None, default: Body | None = None) -> Body:
+    """Return the body, or the default (by default the ball) in place of None."""
+    if body is None:
+        return default or Body.ball()
+    if not isinstance(body, Body):
+        raise ValueError(f"body: a Body is wanted, such as Body(inertia), got {body!r}")
+    return body
+
+
+def at_centre(r: Array, rates: list[Array]) -> list[Array]:
+    """Return the velocity (and acceleration) of the point r of a body, in the body frame.
+
+    `rates` contains the twist (w, v) of the body and, if wanted, its acceleration (w', a).
+    """
+    if not r.any():
+        return [rate[..., 3:] for rate in rates]
+    w = rates[0][..., :3]
+    points = [rate[..., 3:] + np.cross(rate[..., :3], r) for rate in rates]
+    if len(points) > 1:
+        points[1] = points[1] + cross(w, np.cross(w, r))
+    return points
+
+
+def _as_rate(name: str, value: ArrayLike | None, size: int) -> Array:
+    """Return a velocity or an acceleration, shape (..., size); None means 0."""
+    if value is None:
+        return np.zeros(size)
+    rate = as_array(name, value)
+    if rate.shape[-1:] != (size,):
+        kind = {3: "rotations", 6: "poses"}[size]
+        hint = "; twist_from_rates makes twists" * (size == 6)
+        raise ValueError(
+            f"{name}: shape (..., {size}) is wanted, since start and goal are {kind}, "
+            f"got {rate.shape}{hint}"
+        )
+    check_all(np.isfinite(rate), name, rate, "a finite number")
+    return rate

@@ -1,0 +1,244 @@
+"""Optima as curves: the class `Optimum`, and its curves on SO(3) and SE(3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbcourse._chebyshev import along, chebyshev, grid, primitives
+from rbcourse._checks import as_time
+from rbcourse._numerics import Array
+from rbcourse.body import Body
+from rbcourse.curves.curve import Curve, weighted_sums
+from rbcourse.curves.functionals import Functional
+from rbcourse.curves.rigid import RigidMotion
+from rbcourse.optimum._collocation import Failure, Solution, orthogonal
+from rbcourse.optimum._second_variation import is_positive
+
+_FOUND = [
+    ("converged", bool),
+    ("nodes", int),
+    ("iterations", int),
+    ("cost", float),
+    ("residual", float),
+]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Optimum(Curve):
+    """A `Curve`, or a stack of curves, of least acceleration, torque or jerk.
+
+    For a stack, the attributes below are arrays of the shape of the stack.
+    Source: BK (19); beyond BK 2, beyond BK 15.
+
+    Attributes
+    ----------
+    cost : float
+        The `acceleration_cost`, `torque_cost` or `jerk_cost` for the body of the curve.
+    converged : bool
+        Whether a solution was found and no curve that was tried costs less. The solution is
+        stationary, but another curve may cost less; the functions that return optima tell for
+        which problems this was tested. If no solution was found, the curve, `c` and the cost are
+        NaN.
+    certified : bool
+        Whether the curve is proven to be a strict local minimum: all nearby curves with the same
+        ends cost more. It is False for a saddle, for a curve that is NaN, and if the proof fails.
+        It is computed when it is first used, in a few ms for each curve.
+    c : ndarray, shape (..., 3)
+        The constant vector R p in the fixed frame (R w'' for the acceleration of a ball; p is the
+        costate of `rbcourse.curves.functionals`).
+    residual, iterations : float, int
+        The largest error of the equations, and the number of steps of the solver.
+
+    Notes
+    -----
+    The proof of `certified` shows that the second variation is positive: it computes this quadratic
+    form on polynomials and bounds the rest (see `rbcourse.optimum._second_variation`). The proof
+    holds up to rounding, quadrature and the error of the computed curve. It does not exclude
+    distant curves that cost less. An eigenvalue below 1e-6 times the leading term counts as 0. For
+    the acceleration of a ball and times from 0 to 1, ‖c‖ < 2π³ is a sufficient condition
+    (docs/near_optimal.md).
+    """
+
+    @property
+    def found(self) -> OptimalRotation:
+        """The optimal rotation."""
+        raise NotImplementedError
+
+    @property
+    def cost(self) -> Any:
+        """The cost that the optimum minimises."""
+        return self.found.cost
+
+    @property
+    def converged(self) -> Any:
+        """Whether a solution was found and no curve that was tried costs less."""
+        return self._told(self.found.report["converged"])
+
+    @property
+    def certified(self) -> Any:
+        """Whether the curve is proven to be a strict local minimum of its cost."""
+        return self._told(self.found.positive)
+
+    @property
+    def c(self) -> Array:
+        """The constant R p in the fixed frame."""
+        return self.found.constant / self.duration[..., None] ** (self.found.functional.ends + 1)
+
+    @property
+    def residual(self) -> Any:
+        """The largest error of the equations."""
+        return self._told(self.found.report["residual"])
+
+    @property
+    def iterations(self) -> Any:
+        """The number of steps of the solver."""
+        return self._told(self.found.report["iterations"])
+
+    def _told(self, values: NDArray[Any]) -> Any:
+        return values if self.batch_shape else values.item()
+
+    def _what(self) -> str:
+        return f"Optimum of {self.found.functional.name}"
+
+    def _result(self) -> str:
+        if self.batch_shape:
+            return f", {np.count_nonzero(self.converged)} of {self.count} converged"
+        proof = "a proven local minimum" if self.certified else "not proven to be a minimum"
+        return f", cost {self.cost:.6g}, {proof}"
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class OptimalRotation(Optimum):
+    """An `Optimum` on SO(3), along which R p is constant.
+
+    By BK (19), R w'' is constant for a ball, since (R w'')' = R (w''' + w × w'').
+    Source: beyond BK 2; BK (19).
+    """
+
+    functional: Functional
+    series: Array  # Chebyshev coefficients of R, w, w', …, with a column for each entry
+    constant: Array  # c for times from 0 to 1
+    report: NDArray[np.void]  # the report of each problem, with the fields of `_FOUND`
+
+    @property
+    def found(self) -> OptimalRotation:
+        """The curve itself."""
+        return self
+
+    @property
+    def cost(self) -> Any:
+        """The cost that the optimum minimises."""
+        return self._told(self.report["cost"] / self.duration ** (self.functional.ends + 1))
+
+    @property
+    def nodes(self) -> Any:
+        """The number of nodes that represent the curve."""
+        return self._told(self.report["nodes"])
+
+    @cached_property
+    def positive(self) -> NDArray[np.bool_]:
+        """Whether the second variation is proven to be positive, shape (...)."""
+        return is_positive(self.flat).reshape(self.batch_shape)
+
+    def take(self, index: Any) -> Self:
+        """Return the curves that have these indices in the flattened stack."""
+        functional = self.functional.take(np.reshape(index, -1))
+        return replace(super().take(index), functional=functional)
+
+    def values(self, t: Array, order: int) -> Array:
+        """Return R or a derivative at the times t; R is orthogonal up to rounding."""
+        columns = slice(9) if order == 0 else slice(6 + 3 * order, 9 + 3 * order)
+        terms = self.series[..., columns]
+        weights = chebyshev(t, terms.shape[1])
+        if order:
+            return weighted_sums(weights, terms, 3)
+        return orthogonal(weighted_sums(weights, terms, 3, 3))
+
+    def costate(self, t: ArrayLike) -> Array:
+        """Return p in the body frame at times of any shape.
+
+        The result has the shape t.shape + (..., 3), and R p is the constant `c`.
+        """
+        times = as_time(t, 0, self.domain)
+        orders = range(1, self.functional.ends + 2)
+        rates = [self.evaluate(times.reshape(-1, 1), order).swapaxes(0, 1) for order in orders]
+        p = np.reshape(self.functional.unit, (-1, 1, 1)) * self.functional.p(*rates)
+        return p.swapaxes(0, 1).reshape(*times.shape, *self.batch_shape, 3)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class OptimalMotion(RigidMotion, Optimum):
+    """An `Optimum` on SE(3): an `OptimalRotation`, and a cubic for the centre of mass."""
+
+    rotation: OptimalRotation
+
+    @property
+    def found(self) -> OptimalRotation:
+        """The optimal rotation."""
+        return self.rotation
+
+    @property
+    def cost(self) -> Any:
+        """The cost that the optimum minimises: rotation and translation."""
+        return self._told(self.rotation.cost + self.body.mass * self.moving_cost)
+
+    @property
+    def moving_cost(self) -> Array:
+        """The integral of ‖d_c''‖² of the centre of mass, for a cubic path, shape (...)."""
+        x0, x1, v0, v1 = np.moveaxis(self.path, -2, 0)
+        start, end = v0 - (x1 - x0), v1 - (x1 - x0)
+        squares = np.sum(start**2 + start * end + end**2, axis=-1)
+        moving: Array = 4 * squares / self.duration**3
+        return moving
+
+
+def optimum_of(
+    functional: Functional,
+    ends: Array,
+    solutions: Sequence[Solution | Failure],
+    duration: Array,
+    body: Body,
+) -> OptimalRotation:
+    """Return the solutions as a stack of curves; its batch shape is the shape of the durations."""
+    batch = duration.shape
+    found, c = np.zeros(len(solutions), _FOUND), np.full((len(solutions), 3), np.nan)
+    for i, one in enumerate(solutions):
+        found[i] = False, 0, one.iterations, np.nan, one.residual
+        if isinstance(one, Solution):
+            c[i] = one.c
+            found[i] = not one.beaten, len(one.R), one.iterations, one.cost, one.residual
+    found["cost"] *= functional.scale
+    c *= np.reshape(functional.unit, (-1, 1))
+    series = _series(ends, solutions, found["nodes"])
+    return OptimalRotation(
+        duration=duration,
+        body=body,
+        functional=functional,
+        series=series.reshape(*batch, *series.shape[1:]),
+        constant=c.reshape(*batch, 3),
+        report=found.reshape(batch),
+    )
+
+
+def _series(ends: Array, solutions: Sequence[Solution | Failure], nodes: Array) -> Array:
+    """Return the Chebyshev series of R, w, w', …, shape (count, n, 9 + 3 + …).
+
+    Series of fewer nodes are padded with zeros. Series of problems without a solution are NaN.
+    """
+    m = ends.shape[1]
+    series = np.zeros((len(nodes), nodes.max(initial=1) + m, 12 + 3 * m))
+    for n in np.unique(nodes[nodes > 0]):
+        index = np.flatnonzero(nodes == n)
+        R, k = (np.stack([solutions[i][part] for i in index.tolist()]) for part in (0, 1))
+        by = primitives(n, m)
+        series[index, :n, :9] = along(grid(n).series, R).reshape(len(index), n, 9)
+        for order, (E, K) in enumerate(zip(by.series_from_ends, by.series_from_k, strict=True)):
+            series[index, : len(E), 9 + 3 * order : 12 + 3 * order] = E @ ends[index] + K @ k
+    series[nodes == 0] = np.nan
+    return series

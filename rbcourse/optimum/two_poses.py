@@ -1,0 +1,325 @@
+"""Curves between two rotations or poses with the least acceleration (BK (19)), torque or jerk.
+
+`rbcourse.textbook.minimum_acceleration` has (19) as it is printed. `_collocation` solves it fast,
+as R w'' = c, and `_search` chooses the curves from which it starts.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._chebyshev import grid
+from rbcourse._docs import described_by
+from rbcourse._numerics import Array
+from rbcourse.body import Body
+from rbcourse.curves.curve import Curve
+from rbcourse.curves.ends import Ends, Given, between, on_rotations
+from rbcourse.optimum._collocation import EXACT, Failure
+from rbcourse.optimum._result import OptimalMotion, OptimalRotation, Optimum, optimum_of
+from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, jerk
+from rbcourse.optimum._search import body as of_body
+
+
+def minimum_acceleration(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    body: Body | None = None,
+    duration: ArrayLike = 1.0,
+) -> Optimum:
+    """Return the minimum-acceleration curve with these ends, for a ball or for any body.
+
+    Source: BK (19), BK 6.2, BK 6.3, BK Prop. 7; beyond BK 3, beyond BK 9 (for bodies, see
+    `rbcourse.curves.functionals.Effort`).
+
+    Parameters
+    ----------
+    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
+        Rotation matrices, or poses.
+    v0, v1 : array_like, shape (..., 3) or (..., 6), optional
+        The velocities at both ends in the body frame: angular velocities w for rotations, twists
+        (ω, v) for poses. The default is rest. `twist_from_rates` makes twists of ω and ḋ.
+    body : Body, optional
+        The body that moves: one for all problems of a stack, or one for each problem. The default
+        is the ball of metrics (12) and (14).
+    duration : array_like, shape (...), optional
+        The duration of the motion; velocities are per unit of this time.
+
+    Returns
+    -------
+    Optimum
+        A `Curve` that meets all boundary conditions. Its ``cost`` is the `acceleration_cost`, the
+        lowest that was found. For a ball, R w'' is the constant ``c``. For a body, ``c`` is the
+        constant R p of the costate p. For poses, the ``rotation`` is the optimum for rotations, and
+        the centre of mass moves on a cubic.
+
+    Raises
+    ------
+    ConvergenceError
+        For a single problem, if Newton's method does not converge from any of its starting curves.
+
+    Warns
+    -----
+    RuntimeWarning
+        If Newton's method does not converge for some problems of a stack (their curves are NaN), or
+        if a starting curve costs less than the returned curve. In both cases, ``converged`` is
+        False for the problem.
+
+    See Also
+    --------
+    rbcourse.textbook.minimum_acceleration : The equation, solved by SciPy's `solve_bvp`.
+    rbcourse.textbook.shoot : The same optimum by shooting.
+    rbcourse.closed_forms.corrected_bezier : A near-optimal formula.
+    excess_estimate : An estimate of the excess.
+
+    Notes
+    -----
+    Singular set: none is known in closed form. Equation (19) is a necessary condition, not a
+    sufficient one, and has several solutions. Costs with a relative difference below 1e-9 count as
+    equal, so that rounding does not decide which curve is returned.
+
+    The starting curves turn the short way or the long way. If ‖w0‖ + ‖w1‖ > 4π, some follow the
+    motion that costs least if the rotation at t = 1 is free. For a body, the search also starts
+    from the optimum of the ball and from curves that lead from one free motion to another, and it
+    adds spin about the principal axes. Gauss–Newton steps lower the costs of all these curves. Then
+    Newton's method solves R p = c, starting from the cheapest curves. The result is stationary, and
+    ``certified`` tells whether it is proven to be a local minimum. It is not proven that no other
+    curve costs less, even if ``converged`` is True. For one of 300 balls with speeds of 15 to 30 at
+    both ends, sixteen random starts of another optimiser found a cheaper curve (by 1.2 %). See
+    docs/near_optimal.md for bodies. For very thin rods, the method may not converge. If the end
+    velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)), where p is a cubic and σ is a
+    logarithm of R0ᵀR1 (not always the shortest logarithm).
+
+    For poses, the rotation and the position d + R r of the centre of mass are independent in the
+    metric of the kinetic energy, so that each has its own optimum. The mass changes the cost of the
+    motion, but not the motion. `projected_cubic` is near-optimal and has a closed form.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, pose_from_coordinates
+    >>> ends = np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0]
+    >>> minimum_acceleration(*ends)([0, 1], 1).round(9) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    >>> book = Body(np.diag([1.0, 2.22, 3.18]))
+    >>> minimum_acceleration(*ends, body=book)
+    <Optimum of acceleration on SO(3), t in [0, 1], cost 91.221, a proven local minimum>
+    >>> A1 = pose_from_coordinates([0, 0, 1, 2, 0, 0])
+    >>> minimum_acceleration(np.eye(4), A1)(0.5)[:3, 3].round(9)
+    array([1., 0., 0.])
+    """
+    given = between(start, goal, v0, v1, body=body, duration=duration)
+    if given.body.is_ball:
+        return _solved(ball(given.ends), given)
+    return _solved(of_body(given.ends, _inertias(given), of_torque=False), given)
+
+
+@described_by(minimum_acceleration)
+def minimum_torque(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    *,
+    body: Body,
+    duration: ArrayLike = 1.0,
+) -> Optimum:
+    """Return the curve with these ends and the least integral of squared torque, on SO(3).
+
+    Source: beyond BK 4 (see `rbcourse.curves.functionals.Effort`).
+
+    Parameters
+    ----------
+    start, goal : array_like, shape (..., 3, 3)
+        Rotation matrices.
+    v0, v1 : array_like, shape (..., 3), optional
+        The angular velocities at both ends in the body frame. The default is rest.
+    body : Body
+        The body that moves: one for all problems of a stack, or one for each problem.
+    duration
+        As for `minimum_acceleration`.
+
+    Returns
+    -------
+    Optimum
+        A `Curve` that meets all four boundary conditions. Its ``cost``, ∫ ‖τ‖² dt with the torque τ
+        = G w' + w × G w, is the lowest that was found; ``c`` is the constant R p of the costate p.
+
+    Notes
+    -----
+    The method, errors, warnings and singular set are those of `minimum_acceleration`. The curve of
+    a rod may not be the cheapest one, even if ``converged`` is True: for 3 of 600 rods with moments
+    (1, 6 to 10, up to 1 more), angles up to π and speeds up to 9, another optimiser found a curve
+    that is cheaper, by 0.5, 3.5 and 6.3 %. For thin rods, the method often does not converge. A
+    turn about a principal axis is a stationary curve. A turn about the axis of the largest moment
+    of inertia may be a saddle. Then a curve that leaves the axis costs less; the search also tries
+    such curves. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c; see
+    `rbcourse.textbook.minimum_torque`.
+
+    Examples
+    --------
+    From rest to rest, a turn of a book about the axis of its largest moment has the least torque if
+    the angle is at most about 107.9°. Beyond this angle, curves that leave the axis cost less:
+
+    >>> from rbcourse import exp_so3
+    >>> book = Body(np.diag([1.0, 2.22, 3.18]))
+    >>> c = minimum_torque(np.eye(3), exp_so3([0, 1.5, 0]), body=book)
+    >>> round(c.cost, 9)  # about a principal axis 12 (2.22 · 1.5)²
+    133.0668
+    >>> minimum_torque(np.eye(3), exp_so3([0, 0, np.radians(100)]), body=book).certified
+    True
+    """
+    given = between(start, goal, v0, v1, body=body, duration=duration)
+    given = on_rotations(given, "minimum torque")
+    return _solved(of_body(given.ends, _inertias(given), of_torque=True), given)
+
+
+@described_by(minimum_acceleration)
+def minimum_jerk(
+    start: ArrayLike,
+    goal: ArrayLike,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    a0: ArrayLike | None = None,
+    a1: ArrayLike | None = None,
+    *,
+    duration: ArrayLike = 1.0,
+) -> Optimum:
+    """Return the minimum-jerk curve with these ends, on SO(3).
+
+    Source: beyond BK 5 (see `rbcourse.curves.functionals.Jerk`).
+
+    Parameters
+    ----------
+    start, goal : array_like, shape (..., 3, 3)
+        Rotation matrices.
+    v0, v1, a0, a1 : array_like, shape (..., 3), optional
+        The angular velocities w and accelerations w' at both ends in the body frame. The default is
+        0.
+    duration
+        As for `minimum_acceleration`.
+
+    Returns
+    -------
+    Optimum
+        A `Curve` that meets all six boundary conditions. Its ``cost``, the integral of the squared
+        covariant jerk ∫ 2 ‖w'' + ½ w × w'‖² dt, is the lowest that was found; ``c`` is the constant
+        R p of the costate p.
+
+    Notes
+    -----
+    The method, errors, warnings and singular set are those of `minimum_acceleration`. If all end
+    velocities and accelerations are 0, the optimum is R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)). It follows
+    the geodesic, and costs 1440 ‖σ‖². `closed_forms.exponential_quintic` is near-optimal and has a
+    closed form.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> c = minimum_jerk(np.eye(3), exp_so3([0, 0, 1.5]), a1=[0, 1, 0])
+    >>> c([0, 1], 2).round(9) + 0.0
+    array([[0., 0., 0.],
+           [0., 1., 0.]])
+    """
+    given = between(start, goal, v0, v1, a0, a1, duration=duration)
+    given = on_rotations(given, "minimum jerk")
+    return _solved(jerk(given.ends, *given.bends), given)
+
+
+def stationary(guess: Curve) -> Optimum:
+    """Return the stationary curve that Newton's method finds from a guess with the same ends.
+
+    Source: BK (19).
+
+    Parameters
+    ----------
+    guess : Curve
+        A curve on SO(3), or a stack of curves, without NaN. Its body does not matter.
+
+    Returns
+    -------
+    Optimum
+        A `Curve` along which R w'' is constant. At both ends it has the rotation and the velocity
+        of the guess. It may not be the cheapest such curve. If no curve is found, the result is NaN
+        (see ``converged``).
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, projected_cubic
+    >>> guess = projected_cubic(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
+    >>> c = stationary(guess)
+    >>> bool(np.abs(c([0, 1], 1) - guess([0, 1], 1)).max() < 1e-12), c.residual < 1e-12
+    (True, True)
+    """
+    if not isinstance(guess, Curve) or guess.size != 3 or guess.domain[0] != 0:
+        raise ValueError(f"guess: a Curve on SO(3) that starts at t = 0 is wanted, got {guess!r}")
+    unit = guess.retimed(1.0)
+    (R0, R1), (w0, w1) = unit([0, 1]), unit([0, 1], 1)
+    if not np.isfinite([w0, w1]).all():
+        raise ValueError("guess: a curve is NaN, since it did not converge")
+    task = ball(Ends(R0, R1, w0, w1))
+    R = np.moveaxis(unit(grid(LIMITS.nodes).t).reshape(LIMITS.nodes, -1, 3, 3), 0, 1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = task.solver(task.equations, R)
+        ends = task.equations.ends
+        return optimum_of(task.functional, ends, found, guess.duration, Body.ball())
+
+
+class ConvergenceError(RuntimeError):
+    """The error raised if no curve is found; it gives the `residual` after `iterations` steps."""
+
+    def __init__(self, residual: float, iterations: int) -> None:
+        reason = "the end velocities may be too large, or the principal moments too different"
+        if residual < EXACT:
+            reason = "only a saddle was found"
+        super().__init__(
+            f"no convergence: residual {residual:.1e} after {iterations} iterations; {reason}"
+        )
+        self.residual = residual
+        self.iterations = iterations
+
+    def __reduce__(self) -> tuple[type, tuple[float, int]]:
+        """Return the class and its arguments, so that pickle restores both attributes."""
+        return type(self), (self.residual, self.iterations)
+
+
+def _inertias(given: Given) -> Array:
+    return np.broadcast_to(given.body.inertia, (*given.duration.shape, 3, 3))
+
+
+def _solved(task: Task, given: Given) -> Optimum:
+    """Return the cheapest curve that is found for each problem."""
+    solutions = cheapest(task)
+    if not task.batch and isinstance(solutions[0], Failure):
+        raise ConvergenceError(*solutions[0])
+    ends, T = task.equations.ends, given.duration
+    rotation = optimum_of(task.functional, ends, solutions, T, given.body)
+    _warn_if_not_converged(rotation)
+    if not given.path:
+        return rotation
+    path = np.stack(given.path, axis=-2)
+    return OptimalMotion(duration=T, body=given.body, rotation=rotation, path=path)
+
+
+def _warn_if_not_converged(curve: OptimalRotation) -> None:
+    lost = np.isnan(curve.cost)
+    _warn(curve, lost, "did not converge", "their curves are NaN")
+    beaten = ~np.asarray(curve.converged) & ~lost
+    _warn(curve, beaten, "may not have reached their optimum", "a curve that was tried costs less")
+
+
+def _warn(curve: OptimalRotation, some: Array, what: str, why: str) -> None:
+    places = np.argwhere(some)
+    if len(places):
+        first = [int(i) for i in places[0]]
+        warnings.warn(
+            f"{len(places)} of {curve.count} problems {what}, the first of them {first}: {why} "
+            "(see converged)",
+            RuntimeWarning,
+            stacklevel=5,
+        )
