@@ -1,6 +1,7 @@
 """Hermite interpolation by polynomials of degree one, three and five."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +10,7 @@ from rbcourse._checks import check_order
 from rbcourse._numerics import Array
 
 
-def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
+def hermite(ends: Sequence[ArrayLike] | Array, t: Array | float, order: int = 0) -> Array:
     """Evaluate a Hermite polynomial, or its derivative of the given order, at the times t.
 
     `ends` contains the values x0, x1 at t = 0 and 1, for a cubic also the derivatives v0, v1, and
@@ -50,18 +51,18 @@ def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
     return [x0, x1, x1 - x0, *rates]
 
 
-def _weights(count: int, t: Array, order: int) -> list[Array]:
+def _weights(count: int, t: Any, order: int) -> list[Any]:
     """Return the weights of the terms; derivatives depend on x0 and x1 only through x1 − x0."""
     starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
     rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
     weights = [weight for pair in rates for weight in pair]
     if order:
         return [(-1) ** order * ends[0], *weights]
-    early = t.real < 0.5
-    return [early + 0 * t, ~early + 0 * t, np.where(early, ends[0], -starts[0]), *weights]
+    early = np.less(t.real, 0.5)
+    return [early + 0 * t, 1 - early + 0 * t, np.where(early, ends[0], -starts[0]), *weights]
 
 
-def _start_weights(count: int, t: Array, order: int) -> list[Array]:
+def _start_weights(count: int, t: Any, order: int) -> list[Any]:
     """Return the weights of x0, v0, a0. Up to signs, x1, v1, a1 have the same weights at 1 − t."""
     s = 1 - t
     match count, order:

@@ -420,6 +420,21 @@ class QuaternionCurve(Curve):
             return np.moveaxis(angular_velocity(Q), 0, -1)
         return rotation(multiply(self.start.T[:, None], Q[0]))
 
+    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+        """Return derivatives of one curve at one time, from one jet."""
+        flat, time = self.flat, np.array([[t]])
+        Q = flat.quaternion(flat._first[:, :, None, i : i + 1], time, max(orders))
+        try:
+            flat._check(Q[0], time)
+        except SingularTime as error:
+            raise SingularTime(error.time, i, error.reason) from None
+        return [
+            angular_velocity(Q[: k + 1])[:, 0, 0]
+            if k
+            else rotation(multiply(flat.start[i], Q[0][:, 0, 0]))
+            for k in orders
+        ]
+
     def _check(self, Q: Array, t: Array) -> None:
         """Raise SingularTime if Q is 0 up to rounding at one of the times."""
 
@@ -460,6 +475,12 @@ class Moved(Curve):
     def lasting(self, duration: Array) -> Self:
         """Return the same curves with other durations."""
         return replace(self, duration=duration, curve=self.curve.lasting(duration))
+
+    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+        """Return derivatives of one curve at one time."""
+        pose, *rates = self.curve.single(i, t, tuple(range(max(orders) + 1)))
+        found = [self.left @ pose @ self.right, *moved_rates(self.right, *rates)]
+        return [found[k] for k in orders]
 
     def values(self, t: Array, order: int) -> Array:
         """Return L c X, or a derivative in the new body frame."""

@@ -12,7 +12,13 @@ from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse.body import Body, weight_of
-from rbcourse.curves.curve import Curve, check_defined, least_over_time, near_margins
+from rbcourse.curves.curve import (
+    Curve,
+    SingularTime,
+    check_defined,
+    least_over_time,
+    near_margins,
+)
 from rbcourse.curves.ends import Ends, between
 from rbcourse.curves.rigid import moving
 from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singular
@@ -48,6 +54,27 @@ class ProjectedPolynomial(Curve):
             return R
         R = np.ascontiguousarray(np.moveaxis(R, (-2, -1), (0, 1)))
         return np.moveaxis(_rates(R, *M)[order - 1], 0, -1)
+
+    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+        """Return R, w and w' of one curve at one time, as `textbook.projected_cubic` does."""
+        if max(orders) > 2:
+            return super().single(i, t, orders)
+        ends = self.flat.ends[i]
+        M = [hermite(ends, t, k) for k in range(max(orders) + 1)]
+        R, unique = nearest(M[0])
+        if not unique:
+            raise SingularTime(t, i, NOT_UNIQUE)
+        found = [R]
+        if len(M) > 1:
+            S, A = R.T @ M[0], R.T @ M[1]
+            inverse = np.linalg.inv(np.trace(S) * np.eye(3) - S)
+            w = inverse @ _skew(A)
+            found.append(w)
+        if len(M) > 2:
+            W = hat(w)
+            S_rate, A_rate = A - W @ S, R.T @ M[2] - W @ A
+            found.append(inverse @ (_skew(A_rate) - np.trace(S_rate) * w + S_rate @ w))
+        return [found[k] for k in orders]
 
     @cached_property
     def _terms(self) -> Array:

@@ -50,9 +50,7 @@ class RigidMotion(Curve):
         """Return derivatives of curve number i of the flat stack at one time from 0 to 1."""
         R, *rates = self.rotation.single(i, t, tuple(range(max(orders) + 1)))
         path, r = self.flat.path[i], self.body.centre
-        return [
-            _of_rotation_and_path(r, R, rates[:k], hermite(path, np.array(t), k), k) for k in orders
-        ]
+        return [_of_rotation_and_path(r, R, rates[:k], hermite(path, t, k), k) for k in orders]
 
     @cached_property
     def _terms(self) -> Array:
