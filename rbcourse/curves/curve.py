@@ -496,7 +496,7 @@ def moved_rates(X: Array, *rates: Array) -> list[Array]:
     a + w' × r + w × (w × r).
     """
     R, found = X[:3, :3], [x.copy() for x in rates]
-    if X.shape == (4, 4):
+    if rates and X.shape == (4, 4):
         r, w = X[:3, 3], rates[0][..., :3]
         found[0][..., 3:] += cross(w, r)
         if len(rates) > 1:
