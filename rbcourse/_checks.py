@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from operator import index
@@ -28,21 +29,7 @@ def as_array(
     a method ``as_matrix``, such as SciPy's ``Rotation`` and ``RigidTransform``, are replaced by
     their matrices.
     """
-    given: Any
-    if not core or core[-1] in core[:-1]:  # square matrices
-        value = _matrices_of(value)
-    parts: Any = value if isinstance(value, list | tuple) else [value]
-    ma = sys.modules.get("numpy.ma")  # if numpy.ma is not loaded, no array is masked
-    if ma and any(isinstance(part, ma.MaskedArray) for part in parts):
-        raise ValueError(
-            f"{name}: an array without a mask is wanted, got a masked array; fill or compress it"
-        )
-    try:
-        given = np.asarray(value)
-    except ValueError as error:
-        raise ValueError(
-            f"{name}: an array of numbers is wanted, got rows of unequal length"
-        ) from error
+    given = value if type(value) is np.ndarray else _array_of(name, value, *core)
     if given.dtype.kind not in "biuf":
         raise ValueError(f"{name}: real numbers are wanted, got dtype {given.dtype}")
     if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
@@ -56,7 +43,8 @@ def as_array(
 def as_finite(name: str, value: ArrayLike, *core: int | str, stacked: bool = True) -> Array:
     """Return `value` as `as_array` does, but refuse NaN and infinity."""
     array = as_array(name, value, *core, stacked=stacked)
-    check_all(np.isfinite(array), name, array, "a finite number")
+    if not math.isfinite(np.vdot(array, array)):  # 0.7 µs instead of 3 for np.isfinite(array).all()
+        check_all(np.isfinite(array), name, array, "a finite number")
     return array
 
 
@@ -127,7 +115,7 @@ def as_time(
     end. The end of the domain is a number, or an array that broadcasts with the times.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
-    if not (np.all(times >= start) and np.all(times <= end)):
+    if not _all((times >= start) & (times <= end)):
         times = as_finite("t", t)
         ends = np.broadcast_to(end, times.shape)
         slack = 8 * EPS * np.maximum(abs(start), np.abs(ends))
@@ -230,9 +218,32 @@ def first_index(name: str, chosen: NDArray[np.bool_]) -> str:
 
 def check_all(passes: NDArray[np.bool_], name: str, array: Array, wanted: str) -> None:
     """Raise a ValueError that names the first entry that does not pass, and the wanted values."""
-    if not passes.all():
+    if not _all(passes):
         value = array[~passes][0]
         raise ValueError(f"{first_index(name, ~passes)} is {value}, {wanted} is wanted")
+
+
+def _all(passes: NDArray[np.bool_]) -> bool:
+    """Return whether all are True; of a single one, in 0.1 µs instead of 2."""
+    return bool(passes.all() if passes.ndim else passes)
+
+
+def _array_of(name: str, value: Any, *core: int | str) -> NDArray[Any]:
+    """Return an array; refuse ragged and masked arrays, and replace objects by their matrices."""
+    if not core or core[-1] in core[:-1]:  # square matrices
+        value = _matrices_of(value)
+    parts = value if isinstance(value, list | tuple) else [value]
+    ma = sys.modules.get("numpy.ma")  # if numpy.ma is not loaded, no array is masked
+    if ma and any(isinstance(part, ma.MaskedArray) for part in parts):
+        raise ValueError(
+            f"{name}: an array without a mask is wanted, got a masked array; fill or compress it"
+        )
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ValueError(
+            f"{name}: an array of numbers is wanted, got rows of unequal length"
+        ) from error
 
 
 def _matrices_of(value: Any) -> Any:
@@ -258,9 +269,9 @@ def converter(shape: tuple[int, ...]) -> str:
 
 
 def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:
-    if len(shape) < len(core):
-        return False
     tail = shape[len(shape) - len(core) :]
-    letters = {c: size for c, size in zip(core, tail, strict=True) if isinstance(c, str)}
-    wanted = [letters[c] if isinstance(c, str) else c for c in core]
-    return list(tail) == wanted and all(size > ("+1" in c) for c, size in letters.items())
+    if tail == core:
+        return True
+    letters = {c: size for c, size in zip(core, tail, strict=False) if isinstance(c, str)}
+    wanted = tuple(letters.get(str(c), c) for c in core)
+    return tail == wanted and all(size > ("+1" in c) for c, size in letters.items())

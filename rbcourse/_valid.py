@@ -6,11 +6,13 @@ precision have, is removed by projection. A larger deviation raises ValueError.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_array, as_finite, converter, first_index
-from rbcourse._foam import write_cofactors
+from rbcourse._foam import Entries, cofactors, dot
 from rbcourse._numerics import Array, blocks
 from rbcourse.projection import nearest
 
@@ -70,8 +72,13 @@ def as_unit_quaternions(name: str, value: ArrayLike) -> Array:
 
 def _repair(name: str, R: Array, kind: str, cure: str) -> None:
     """Project matrices that are nearly rotations, in place; refuse matrices that are not."""
-    accepted = _deviations(R.reshape(-1, 3, 3)) <= ACCEPTED
-    off = (~accepted).reshape(R.shape[:-2])
+    if R.size == 9 and _accepted(R.ravel().tolist()):  # with Python's numbers, 3 µs instead of 25
+        return
+    flat, off = R.reshape(-1, 3, 3), np.empty(R.shape[:-2], bool)
+    for part in blocks(len(flat)):
+        block = np.ascontiguousarray(flat[part].transpose(1, 2, 0))
+        with np.errstate(over="ignore", invalid="ignore"):
+            off.reshape(-1)[part] = ~_accepted([*block.reshape(9, -1)])
     if not off.any():
         return
     M = R[off]
@@ -90,19 +97,14 @@ def _repair(name: str, R: Array, kind: str, cure: str) -> None:
     R[off] = nearest(M)[0]
 
 
-def _deviations(R: Array) -> NDArray[np.float64]:
-    """Return the largest entries of R − cof R and of det R − 1, which are 0 for rotations alone.
+def _accepted(R: Entries) -> Any:
+    """Return whether R − cof R and det R − 1 are at most `ACCEPTED`; only rotations have zeros.
 
     To first order, R − cof R is 2E − tr(E) I for a matrix Q (I + E), where Q is the nearest
     rotation. Its diagonal vanishes only if E does.
     """
-    found = np.empty(len(R))
-    for part in blocks(len(R)):
-        M = np.ascontiguousarray(R[part].transpose(1, 2, 0))
-        C = np.empty_like(M)
-        with np.errstate(over="ignore", invalid="ignore"):
-            write_cofactors(M, C)
-            det = np.einsum("jn,jn->n", M[0], C[0])
-            np.subtract(M, C, out=C)
-            found[part] = np.maximum(np.abs(C).max(axis=(0, 1)), np.abs(det - 1))
-    return found
+    C = cofactors(R)
+    accepted = abs(dot(R[:3], C[:3]) - 1) <= ACCEPTED
+    for x, c in zip(R, C, strict=True):
+        accepted &= abs(x - c) <= ACCEPTED
+    return accepted

@@ -15,7 +15,7 @@ from rbcourse._checks import (
     check_broadcast,
     first_index,
 )
-from rbcourse._foam import nearest_rotations
+from rbcourse._foam import nearest_rotation, nearest_rotations
 from rbcourse._numerics import EPS, Array, scaled
 
 __all__ = [
@@ -239,6 +239,8 @@ def distance_to_so(M: ArrayLike) -> Array:
 
 def nearest(M: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Return the nearest rotation to M, in the memory layout of M, and whether it is unique."""
+    if M.size == 9 and (only := nearest_rotation(M)) is not None:
+        return only.reshape(M.shape), np.ones(M.shape[:-2], bool)
     flat = M.reshape(-1, *M.shape[-2:])
     R, unique = np.empty_like(flat), np.zeros(len(flat), bool)
     if M.shape[-1] == 3 and len(flat) >= MANY:
