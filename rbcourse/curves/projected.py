@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
@@ -95,13 +95,6 @@ class ProjectedPolynomial(Curve):
     def _least_gap(self) -> tuple[Array, Array]:
         ends = np.moveaxis(self.ends, -3, 0)
         return least_over_time(lambda t: gap(hermite(ends, t[..., None, None])), self.batch_shape)
-
-    def may_jump(self) -> bool:
-        """Return whether the margin may be 0, judged from 9 or, if in doubt, 65 sample times."""
-        may = np.arange(self.count)
-        for samples in (9, 65):
-            may = may[~(self.flat.take(may).least_margins(samples) > 0)]
-        return bool(len(may))
 
     def least_margins(self, samples: int) -> Array:
         """Return estimates of the margins from below, shape (count,), from sample times."""
@@ -194,10 +187,11 @@ def projected_cubic(
     """
     given = between(start, goal, v0, v1, body=body, duration=duration)
     curve = polynomial(given.ends, given.duration)
-    if not given.body.is_ball:
-        W = weight_of("body.inertia", given.body.inertia)
-        W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
-        curve = replace(curve, ends=curve.ends @ W[..., None, :, :], body=given.body)
+    if given.body.is_ball:
+        return moving(given, watched(curve, bound_of_margin(given.ends)))
+    W = weight_of("body.inertia", given.body.inertia)
+    W = 3 * W / np.trace(W, axis1=-2, axis2=-1)[..., None, None]
+    curve = replace(curve, ends=curve.ends @ W[..., None, :, :], body=given.body)
     return moving(given, watched(curve))
 
 
@@ -265,11 +259,93 @@ def polynomial(ends: Ends, duration: Array) -> ProjectedPolynomial:
     return ProjectedPolynomial(ends=M, duration=duration)
 
 
-def watched(curve: ProjectedPolynomial) -> ProjectedPolynomial:
-    """Return the curve; warn if its margin is below 1e-6."""
-    if curve.may_jump():
-        warn_if_nearly_singular(curve.margin, curve.margin_time)
+def watched(curve: ProjectedPolynomial, bound: ArrayLike = 0.0) -> ProjectedPolynomial:
+    """Return the curve; warn if its margin is below 1e-6. The margin is at least the `bound`."""
+    doubtful = np.flatnonzero(np.less(np.broadcast_to(bound, curve.batch_shape), 1e-3))
+    times, margins = np.zeros(curve.count), np.full(curve.count, 2.0)
+    for part in blocks(len(doubtful)):
+        low = doubtful[part]
+        low = low[_may_almost_jump(curve.flat.ends[low])]
+        for few in blocks(len(low), BLOCK // 64):
+            times[low[few]], margins[low[few]] = curve.flat.take(low[few])._least_gap
+    if (margins < 1e-6).any():
+        margins, times = margins.reshape(curve.batch_shape), times.reshape(curve.batch_shape)
+        warn_if_nearly_singular(margins, times * curve.duration)
     return curve
+
+
+def _may_almost_jump(ends: Array) -> NDArray[np.bool_]:
+    """Return whether margins may be below 1e-6, given the ends of polynomials, (N, n, 3, 3).
+
+    A polynomial is in the convex hull of its Bézier control points P. For every matrix C, the sum
+    of the two smallest eigenvalues is at least its value at C minus √2 max ‖P − C‖. Where this
+    bound is too small, the interval of time is halved.
+    """
+    count, n = ends.shape[:2]
+    P = np.tensordot(_control_points(n), ends.reshape(count, n, 9).transpose(1, 2, 0), axes=1)
+    P = np.ascontiguousarray(np.moveaxis(P, 2, 1)).reshape(n, 9, -1)
+    which, doubt = np.tile(np.arange(count), 8), np.zeros(count, bool)
+    for _ in range(20):
+        C = P.mean(axis=0)
+        reach = np.sqrt(2 * np.square(P - C).sum(axis=1).max(axis=0))
+        least = gaps(C.reshape(3, 3, -1)) - GAP_ERROR * np.sqrt(np.square(C).sum(axis=0))
+        near = ~(least - reach > 1e-6)
+        doubt |= np.bincount(which[near], minlength=count) > 64  # small for a long time
+        near &= ~doubt[which]
+        if not near.any():
+            return doubt
+        P, which = _halves(P[..., near]), np.tile(which[near], 2)
+    doubt[which] = True
+    return doubt
+
+
+def bound_of_margin(ends: Ends) -> Array:
+    """Return a lower bound of the margins of projected cubics with these ends in unit time.
+
+    The bound is 2 cos(a/2) − sin(a/2) (5p + 3q)/16, where a is the angle between R0 and R1, and
+    p ≥ q are the norms of w0 and w1. For a turn about one axis with w0 = w1, it may be the margin.
+
+    Proof: let Q be any rotation, A = QᵀM, and N the symmetric 4 × 4 matrix for which qᵀNq is
+    tr(RᵀA) for the rotation R of a unit quaternion q. Its largest eigenvalues are s₁ + s₂ + s₃ and
+    s₁ − s₂ − s₃. The first one is at least N₀₀ = tr A. The second one is at most the largest
+    eigenvalue of A + Aᵀ − tr(A) I, the other diagonal block, since eigenvalues interlace. So s₂ +
+    s₃ is at least the minimum of tr((I − uuᵀ) A) over all unit vectors u.
+    Let Q be half-way from R0 to R1. Then QᵀR0 and QᵀR1 are turns E by ∓a/2 about one axis. The
+    minimum of tr((I − uuᵀ) E) is 2 cos(a/2), and |tr((I − uuᵀ) E ŵ)| is at most 2 sin(a/2) ‖w‖. M
+    is an average of R0 and R1 plus t (1 − t)² R0 ŵ0 − t² (1 − t) R1 ŵ1, and
+    t (1 − t) ((1 − t) ‖w0‖ + t ‖w1‖) ≤ (5p + 3q)/32.
+    """
+    trace = np.einsum("...ij,...ij", ends.R0, ends.R1)  # 1 + 2 cos a
+    speeds = [np.sqrt(np.einsum("...i,...i", w, w)) for w in (ends.w0, ends.w1)]
+    sums = 5 * np.maximum(*speeds) + 3 * np.minimum(*speeds)
+    bound: Array = np.sqrt(np.abs(1 + trace)) - sums / 32 * np.sqrt(np.abs(3 - trace))
+    return bound
+
+
+@cache
+def _control_points(count: int) -> Array:
+    """Return the weights of the ends in the Bézier control points on eighths of the time.
+
+    The shape is (count, 8, count): control points, intervals, ends.
+    """
+    x0, x1, v0, v1, *rest = np.eye(count)
+    points = [x0, x0 + v0 / 3, x1 - v1 / 3, x1]
+    if rest:
+        a0, a1 = rest
+        inner = [x0 + 0.4 * v0 + a0 / 20, x1 - 0.4 * v1 + a1 / 20]
+        points = [x0, x0 + v0 / 5, *inner, x1 - v1 / 5, x1]
+    P = np.stack(points)[..., None]
+    return np.swapaxes(_halves(_halves(_halves(P))), 1, 2)
+
+
+def _halves(P: Array) -> Array:
+    """Return the Bézier control points on both halves of all intervals, the last axis of P."""
+    first, last = [P[0]], [P[-1]]
+    while len(P) > 1:
+        P = (P[1:] + P[:-1]) / 2
+        first.append(P[0])
+        last.append(P[-1])
+    return np.concatenate([np.stack(first), np.stack(last[::-1])], axis=-1)
 
 
 def _rates(R: Array, M: Array, *rates: Array) -> list[Array]:
