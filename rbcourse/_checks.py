@@ -203,6 +203,8 @@ def check_broadcast(**arguments: tuple[Array, int]) -> tuple[int, ...]:
     If the batch shapes do not broadcast, the ValueError lists all of them.
     """
     batches = {name: array.shape[: array.ndim - core] for name, (array, core) in arguments.items()}
+    if len(different := {*batches.values()}) == 1:
+        return different.pop()
     try:
         return np.broadcast_shapes(*batches.values())
     except ValueError as error:

@@ -10,7 +10,7 @@ from rbcourse._checks import check_order
 from rbcourse._numerics import Array
 
 
-def hermite(ends: Sequence[ArrayLike] | Array, t: Array | float, order: int = 0) -> Array:
+def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
     """Evaluate a Hermite polynomial, or its derivative of the given order, at the times t.
 
     `ends` contains the values x0, x1 at t = 0 and 1, for a cubic also the derivatives v0, v1, and
@@ -32,7 +32,8 @@ def hermite_stack(terms: Array, t: Array, order: int) -> Array:
     if t.shape[1] != 1:
         return _sum(weights, terms[..., None, :])
     # one product: for 20 projected cubics at 5,000 times, 1.4 times as fast as the sum
-    return np.stack(weights, axis=-1)[:, 0] @ np.moveaxis(terms[-len(weights) :], 0, -2)
+    terms = terms[-len(weights) :].transpose(*range(1, terms.ndim - 1), 0, -1)
+    return np.array(weights)[..., 0].T @ terms
 
 
 def _sum(weights: list[Array], terms: Sequence[Array] | Array) -> Array:
@@ -51,15 +52,22 @@ def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
     return [x0, x1, x1 - x0, *rates]
 
 
-def _weights(count: int, t: Any, order: int) -> list[Any]:
+def _weights(count: int, t: Array, order: int) -> list[Array]:
     """Return the weights of the terms; derivatives depend on x0 and x1 only through x1 − x0."""
+    if t.size == 1:  # with a Python number, 7 µs instead of 14
+        return [*np.array(_weights_at(count, t.item(), order)).reshape(-1, *t.shape)]
+    return _weights_at(count, t, order)
+
+
+def _weights_at(count: int, t: Any, order: int) -> list[Any]:
     starts, ends = _start_weights(count, t, order), _start_weights(count, 1 - t, order)
     rates = [(starts[j], (-1) ** (j + order) * ends[j]) for j in range(1, count // 2)]
     weights = [weight for pair in rates for weight in pair]
     if order:
         return [(-1) ** order * ends[0], *weights]
-    early = np.less(t.real, 0.5)
-    return [early + 0 * t, 1 - early + 0 * t, np.where(early, ends[0], -starts[0]), *weights]
+    early = (t.real < 0.5) * 1.0
+    late = 1 - early
+    return [early, late, early * ends[0] - late * starts[0], *weights]
 
 
 def _start_weights(count: int, t: Any, order: int) -> list[Any]:

@@ -259,9 +259,11 @@ def polynomial(ends: Ends, duration: Array) -> ProjectedPolynomial:
     return ProjectedPolynomial(ends=M, duration=duration)
 
 
-def watched(curve: ProjectedPolynomial, bound: ArrayLike = 0.0) -> ProjectedPolynomial:
+def watched(curve: ProjectedPolynomial, bound: Array | None = None) -> ProjectedPolynomial:
     """Return the curve; warn if its margin is below 1e-6. The margin is at least the `bound`."""
-    doubtful = np.flatnonzero(np.less(np.broadcast_to(bound, curve.batch_shape), 1e-3))
+    doubtful = np.arange(curve.count) if bound is None else np.flatnonzero(bound < 1e-3)
+    if not len(doubtful):
+        return curve
     times, margins = np.zeros(curve.count), np.full(curve.count, 2.0)
     for part in blocks(len(doubtful)):
         low = doubtful[part]
