@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from rbcourse._numerics import Array, blocks, scaled
 
 Entries: TypeAlias = Sequence[Any]
-GAP_ERROR = 4e-6  # of 1.8e6 matrices near s₂ = −s₃ or s₁ = s₂ = s₃, the largest error was 2e-6
+GAP_ERROR = 1e-5  # of 1.8e6 matrices near s₂ = −s₃ or s₁ = s₂ = ±s₃, the largest error was 6e-6
 LEAST_ZETA = 3e-3  # in units of s₁ ‖M‖²; for smaller ζ, the result loses digits
 LEAST, MOST = 1e-30, 1e30  # ‖M‖² is kept between them, which avoids overflow of its sixth power
 
@@ -41,11 +41,11 @@ def nearest_rotation(M: Array) -> Array | None:
     correction of its rounding errors 40 µs.
     """
     entries = M.ravel().tolist()
-    norm2 = dot(entries, entries)
+    norm2 = _sum_of_squares(entries)
     if not LEAST < norm2 < MOST:
         with np.errstate(over="ignore", invalid="ignore"):
             entries = scaled(M).ravel().tolist()
-        norm2 = dot(entries, entries)
+        norm2 = _sum_of_squares(entries)
         if not LEAST < norm2 < MOST:
             return None
     try:
@@ -90,15 +90,15 @@ def _project(M: Entries, norm2: Any, library: ModuleType) -> tuple[Iterator[Any]
     X = [zeta * x + c for x, c in zip(M, C, strict=True)]
     C = cofactors(X)
     half = 0.5 / (zeta * lam)
-    back = half * (zeta * lam) ** 2 / dot(X[:3], C[:3])
+    back = half * (zeta * lam) ** 2 / determinant(X, C)
     rows = (half * x + back * c for x, c in zip(X, C, strict=True))
     return rows, (norm2 > 0) & (zeta > LEAST_ZETA * s1 * norm2)
 
 
 def _eigenvalues(M: Entries, C: Entries, norm2: Any, library: ModuleType) -> tuple[Any, Any, Any]:
     """Return s₁, the gap s₂ + s₃, and det M, given the cofactors C of M."""
-    a, det = norm2 / 3, dot(M[:3], C[:3])
-    r2 = abs(a * a - dot(C, C) / 3) + 1e-200
+    a, det = norm2 / 3, determinant(M, C)
+    r2 = abs(a * a - _sum_of_squares(C) / 3) + 1e-200
     r = library.sqrt(r2)
     cosine = (a * (3 * r2 - a * a) + det * det) / (2 * r2 * r)
     third = library.atan2(library.sqrt(abs(1 - cosine * cosine)), cosine) / 3
@@ -130,9 +130,13 @@ def cofactors(M: Entries) -> Entries:
     )
 
 
-def dot(A: Entries, B: Entries) -> Any:
-    """Return the sum of the products of the entries."""
-    total = A[0] * B[0]
-    for x, y in zip(A[1:], B[1:], strict=True):
-        total += x * y
+def determinant(M: Entries, C: Entries) -> Any:
+    """Return the determinant of M, given its cofactors."""
+    return M[0] * C[0] + M[1] * C[1] + M[2] * C[2]
+
+
+def _sum_of_squares(M: Entries) -> Any:
+    total = M[0] * M[0]
+    for x in M[1:]:
+        total += x * x
     return total

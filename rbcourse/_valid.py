@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_array, as_finite, converter, first_index
-from rbcourse._foam import Entries, cofactors, dot
+from rbcourse._foam import Entries, cofactors, determinant
 from rbcourse._numerics import Array, blocks
 from rbcourse.projection import nearest
 
@@ -104,7 +104,7 @@ def _accepted(R: Entries) -> Any:
     rotation. Its diagonal vanishes only if E does.
     """
     C = cofactors(R)
-    accepted = abs(dot(R[:3], C[:3]) - 1) <= ACCEPTED
+    accepted = abs(determinant(R, C) - 1) <= ACCEPTED
     for x, c in zip(R, C, strict=True):
         accepted &= abs(x - c) <= ACCEPTED
     return accepted

@@ -1,5 +1,7 @@
 """Test projected cubics and quintics, and the polynomials that are projected."""
 
+import tracemalloc
+
 import numpy as np
 import oracles
 import pytest
@@ -8,6 +10,12 @@ from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 from rbcourse._hermite import hermite
+from rbcourse.curves.curve import Ends
+from rbcourse.curves.projected_polynomial import (
+    _may_almost_jump,
+    bound_of_margin,
+    projected_cubic,
+)
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(62)
@@ -145,3 +153,66 @@ def test_the_polynomial_minimises_its_cost(count):
         change = (Polynomial([0, 1, -1]) ** order * Polynomial.basis(k)).deriv(order)
         product = (best * change).integ()
         assert abs(product(1) - product(0)) < 1e4 * EPS * np.abs(product.coef).sum()
+
+
+def ends_with_a_jump(count, rng, miss=0.0):
+    """Return planar problems, in random frames, whose complex numbers z(t) are `miss` at t = ½."""
+    h00, h01, h10, h11 = (hermite(one, np.array(0.5)) for one in np.eye(4))
+    k1, sign = rng.uniform(-40, 40, count), rng.choice([-1, 1], count)
+    k0 = sign * np.sqrt((h01**2 + (k1 * h11) ** 2 - (h00 - miss) ** 2) / h10**2)
+    a = np.angle(-(h00 - miss + 1j * k0 * h10) / (h01 + 1j * k1 * h11))
+    L, Q = (Rotation.random(count, rng=rng).as_matrix() for _ in "LQ")
+    z = np.eye(3)[2]
+    turn = L @ rb.exp_so3(a[:, None] * z) @ Q
+    return L @ Q, turn, *(k[:, None] * (Q.mT @ z) for k in (k0, k1))
+
+
+def test_the_margin_is_at_least_its_bound():
+    """The bound is the margin for turns about one axis with w0 = w1 against the turn."""
+    rng, count = np.random.default_rng(77), 600
+    start, axis = Rotation.random(count, rng=rng).as_matrix(), rng.normal(size=(count, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    angle = np.pi * (1 - 10.0 ** rng.uniform(-9, -0.03, (count, 1)))
+    goal, fastest = start @ rb.exp_so3(angle * axis), 4 / np.tan(angle / 2)
+    speeds = fastest * rng.random((2, count, 1))
+    directions = rng.normal(size=(2, count, 3))
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    near = -axis + 0.1 * directions
+    for w0, w1, exact in (
+        (*2 * (-speeds[0] * axis,), True),
+        (*-speeds * axis, False),
+        (*speeds * near, False),
+        (*speeds * directions, False),
+        (*2 * speeds * directions, False),
+    ):
+        ends = Ends(start, goal, w0, w1)
+        bound, margin = bound_of_margin(ends), projected_cubic(ends, np.ones(count)).margin
+        assert (bound <= margin + 20 * EPS).all()
+        assert not exact or np.abs(bound - margin)[margin > 0.01].max() < 1e-4
+
+
+@pytest.mark.parametrize("miss", [0, 1e-8, 4e-7, 1e-5, 1e-3])
+def test_curves_with_a_small_margin_are_found_in_a_stack(miss):
+    rng, count = np.random.default_rng(3), 200
+    ends = Ends(*ends_with_a_jump(count, rng, miss))
+    curves = projected_cubic(ends, np.ones(count))
+    small = curves.margin < 1e-6
+    assert small.all() if miss < 5e-7 else not small.all()
+    assert _may_almost_jump(curves.ends)[small].all()
+    assert miss < 1e-3 or not _may_almost_jump(curves.ends)[curves.margin > 1e-4].any()
+    assert (bound_of_margin(ends) <= curves.margin + 1e-9).all()
+
+
+def test_a_stack_with_a_jump_needs_little_memory():
+    """The margins of 20,000 curves at 129 times would need 190 MB for the matrices alone."""
+    rng, count = np.random.default_rng(4), 20_000
+    ends = [rb.sample_rotation(count, rng=rng) for _ in range(2)]
+    ends += [*rng.normal(size=(2, count, 3))]
+    for stack, one in zip(ends, ends_with_a_jump(1, rng), strict=True):
+        stack[12_345] = one[0]
+    tracemalloc.start()
+    with pytest.warns(RuntimeWarning, match=r"^margin < 1e-6 of curve \[12345\]: .* t = 0\.5; "):
+        rb.projected_cubic_so3(*ends)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 100e6

@@ -320,7 +320,9 @@ def bound_of_margin(ends: Ends) -> Array:
     trace = np.einsum("...ij,...ij", ends.R0, ends.R1)  # 1 + 2 cos a
     speeds = [np.sqrt(np.einsum("...i,...i", w, w)) for w in (ends.w0, ends.w1)]
     sums = 5 * np.maximum(*speeds) + 3 * np.minimum(*speeds)
-    bound: Array = np.sqrt(np.abs(1 + trace)) - sums / 32 * np.sqrt(np.abs(3 - trace))
+    off = 1e-8  # the largest error of the trace, since entries of RᵀR may be off by 1e-9
+    double_cosine, double_sine = np.sqrt(np.maximum(1 + trace - off, 0)), np.sqrt(3 - trace + off)
+    bound: Array = double_cosine - sums / 32 * double_sine
     return bound
 
 
