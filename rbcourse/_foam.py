@@ -37,20 +37,16 @@ LEAST, MOST = 1e-30, 1e30  # ‖M‖² is kept between them, which avoids overfl
 def nearest_rotation(M: Array) -> Array | None:
     """Return the nearest rotation to one matrix, or None if it is not valid.
 
-    With Python's numbers, one matrix takes 9 µs; `nearest_rotations` takes 100 µs, the SVD with the
-    correction of its rounding errors 40 µs.
+    With Python's numbers, one matrix takes 8 µs; `nearest_rotations` takes 100 µs for it, and the
+    SVD with the correction of its rounding errors takes 45 µs.
     """
     entries = M.ravel().tolist()
-    norm2 = _sum_of_squares(entries)
-    if not LEAST < norm2 < MOST:
+    if not LEAST < _sum_of_squares(entries) < MOST:
         with np.errstate(over="ignore", invalid="ignore"):
             entries = scaled(M).ravel().tolist()
-        norm2 = _sum_of_squares(entries)
-        if not LEAST < norm2 < MOST:
-            return None
     try:
-        R, valid = _project(entries, norm2, math)
-    except ZeroDivisionError:  # ζ = 0
+        R, valid = _project(entries, _sum_of_squares(entries), math)
+    except ArithmeticError:  # ζ = 0
         return None
     return np.array([*R]).reshape(3, 3) if valid else None
 

@@ -268,8 +268,8 @@ def watched(curve: ProjectedPolynomial, bound: Array | None = None) -> Projected
     for part in blocks(len(doubtful)):
         low = doubtful[part]
         low = low[_may_almost_jump(curve.flat.ends[low])]
-        for few in blocks(len(low), BLOCK // 64):
-            times[low[few]], margins[low[few]] = curve.flat.take(low[few])._least_gap
+        if len(low):
+            times[low], margins[low] = curve.flat.take(low)._least_gap
     if (margins < 1e-6).any():
         margins, times = margins.reshape(curve.batch_shape), times.reshape(curve.batch_shape)
         warn_if_nearly_singular(margins, times * curve.duration)
