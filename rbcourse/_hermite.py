@@ -10,7 +10,7 @@ from rbcourse._checks import check_order
 from rbcourse._numerics import Array
 
 
-def hermite(ends: Sequence[ArrayLike] | Array, t: Array, order: int = 0) -> Array:
+def hermite(ends: Sequence[ArrayLike] | Array, t: Array | float, order: int = 0) -> Array:
     """Evaluate a Hermite polynomial, or its derivative of the given order, at the times t.
 
     `ends` contains the values x0, x1 at t = 0 and 1, for a cubic also the derivatives v0, v1, and
@@ -52,8 +52,10 @@ def _terms(ends: Sequence[ArrayLike] | Array) -> list[Array]:
     return [x0, x1, x1 - x0, *rates]
 
 
-def _weights(count: int, t: Array, order: int) -> list[Array]:
+def _weights(count: int, t: Array | float, order: int) -> list[Any]:
     """Return the weights of the terms; derivatives depend on x0 and x1 only through x1 − x0."""
+    if isinstance(t, float):
+        return _weights_at(count, t, order)
     if t.size == 1:  # with a Python number, 7 µs instead of 14
         return [*np.array(_weights_at(count, t.item(), order)).reshape(-1, *t.shape)]
     return _weights_at(count, t, order)
