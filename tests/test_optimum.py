@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
 from rbcourse._chebyshev import grid, interpolation
-from rbcourse.optimum import _search as search
+from rbcourse.optimum._search import Search
 
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
 TIMES = np.linspace(0, 1, 101)
@@ -217,16 +217,15 @@ def test_single_problems_without_convergence_raise_an_error():
 def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkeypatch):
     """For the first of three problems, the test lets Newton's method converge only to curves that
     turn the other way."""
-    real, turns = search._follow, rb.exp_so3([[0, 0, 1], [0, 1, 0], [0, 1, 1]])
+    real, turns = Search.follow, rb.exp_so3([[0, 0, 1], [0, 1, 0], [0, 1, 1]])
     ends = I3, turns, [0, 0, 1], [1, 0, 0]
     good = rb.minimum_acceleration(*ends)
 
-    def failing(task, problem, R, found):
-        far = np.trace(R[:, R.shape[1] // 2], axis1=1, axis2=2) < 0
-        kept = far | (problem > 0)
-        real(task, problem[kept], R[kept], found)
+    def failing(search, curves):
+        far = np.trace(curves.R[:, curves.nodes // 2], axis1=1, axis2=2) < 0
+        real(search, curves.take(far | (curves.problem > 0)))
 
-    monkeypatch.setattr(search, "_follow", failing)
+    monkeypatch.setattr(Search, "follow", failing)
     said = r"^1 of 3 problems may not .* \[0\]: a curve that was tried costs less"
     with pytest.warns(RuntimeWarning, match=said) as warned:
         curves = rb.minimum_acceleration(*ends)

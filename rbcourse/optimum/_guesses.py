@@ -1,8 +1,16 @@
-"""Starting curves of the search, at Chebyshev nodes, and steps that lower their costs."""
+"""Starting curves of the search (`_search`), and Gauss–Newton steps that lower their costs.
+
+Newton's method finds a stationary curve near its start. So the search needs `Curves` with the given
+ends and a low cost ∫ ‖u‖² dt. `starts` and `between_free_motions` make such curves, and `spun` adds
+spin to curves of a body. `lowered` changes a curve R to R exp(η̂), with the η for which u, to first
+order in η, has the least integral of its square.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,63 +20,157 @@ from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, matvec
 from rbcourse.curves.ends import Ends
 from rbcourse.curves.functionals import Functional
-from rbcourse.optimum._collocation import TOGETHER, cayley
+from rbcourse.optimum._collocation import TOGETHER, cayley, on_nodes
 from rbcourse.so3 import exp_so3, hat, log, vee
 
 FAST = 4 * np.pi  # if ‖w0‖ + ‖w1‖ is larger, all four of the `starts` are used
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
+TINY = 1e-150  # replaces norms that are 0 before a division; its square does not underflow
+
+Numbers: TypeAlias = NDArray[np.intp]
+Mask: TypeAlias = NDArray[np.bool_]
 
 
-def starts(ends: Ends, n: int, *accelerations: Array) -> tuple[NDArray[np.intp], Array]:
-    """Return the problem index of each starting curve, and these curves at n nodes.
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """A set of curves, given on the same Chebyshev nodes; each belongs to a problem of a stack."""
 
-    The Bézier control points are C₁ = R0 exp(ŵ0/3) and R1 exp(−ŵ1/3). With β = 3t² − 2t³ and
-    rotation vectors v from C₁ to the other control point, two curves that have the given ends are
+    problem: Numbers  # the problem of each curve: its number in the stack
+    R: Array  # rotations at the nodes, shape (N, n, 3, 3)
+    cost: Array  # ∫ ‖u‖² dt, or inf before `lowered` has computed it
+
+    @staticmethod
+    def of(problem: Numbers, R: Array) -> Curves:
+        """Return curves of these problems, of unknown cost."""
+        return Curves(problem, R, np.full(len(R), np.inf))
+
+    @staticmethod
+    def for_each(R: Array) -> Curves:
+        """Return m curves for each of N problems, from rotations of the shape (m, N, n, 3, 3)."""
+        m, count = R.shape[:2]
+        return Curves.of(np.tile(np.arange(count), m), R.reshape(-1, *R.shape[2:]))
+
+    @staticmethod
+    def none(n: int) -> Curves:
+        """Return an empty set of curves on n nodes."""
+        return Curves.of(np.empty(0, int), np.empty((0, n, 3, 3)))
+
+    @property
+    def nodes(self) -> int:
+        """The number of nodes."""
+        return self.R.shape[1]
+
+    def __len__(self) -> int:
+        return len(self.R)
+
+    def take(self, index: Any) -> Curves:
+        """Return the curves that a NumPy index selects."""
+        return Curves(self.problem[index], self.R[index], self.cost[index])
+
+    def joined(self, *others: Curves) -> Curves:
+        """Return these curves followed by others."""
+        parts = [(one.problem, one.R, one.cost) for one in (self, *others)]
+        return Curves(*map(np.concatenate, zip(*parts, strict=True)))
+
+    def renumbered(self, index: Numbers) -> Curves:
+        """Return the curves with the problem numbers index[0], index[1], … in place of 0, 1, …."""
+        return Curves(index[self.problem], self.R, self.cost)
+
+    def on_nodes(self, n: int) -> Curves:
+        """Return the curves interpolated to n nodes, of unknown cost."""
+        return Curves.of(self.problem, on_nodes(self.R, n))
+
+    def with_ends(self, ends: Array) -> Curves:
+        """Multiply the curves by factors exp(η̂) that correct w0, w1 and, if given, a0, a1.
+
+        On too few nodes, the polynomials through R have other end velocities than w0 and w1; Δw₀
+        and Δw₁ are the differences. The factor for velocities has η = t (1 − t)² Δw₀ − t² (1 − t)
+        Δw₁. For accelerations, a second factor has η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁. The
+        values `ends` of all problems have the shape (…, 2, 3) or (…, 4, 3).
+        """
+        t, R = grid(self.nodes).t[:, None], self.R
+        for order in range(1, 1 + ends.shape[1] // 2):
+            now = rates_of(R, order)[-1][:, [0, -1]]
+            given = ends[self.problem, 2 * order - 2 : 2 * order]
+            lacking = _bounded(given - now)[:, :, None]
+            share = (t * (1 - t)) ** order / order
+            change = (1 - t) * lacking[:, 0] + (-1) ** order * t * lacking[:, 1]
+            R = R @ exp_so3(share * change)
+        return Curves.of(self.problem, R)
+
+    def least(self, count: int) -> Array:
+        """Return the cost of the cheapest curve of each of `count` problems; inf if it has none."""
+        least = np.full(count, np.inf)
+        np.fmin.at(least, self.problem, self.cost)
+        return least
+
+
+def starts(ends: Ends, n: int, *accelerations: Array) -> Curves:
+    """Return two starting curves at n nodes for each problem, and two more if its ends are fast.
+
+    The curves turn the short way and the long way. They do not depend on the choice of frames. The
+    ends R1, R0, −w1, −w0 give the reversed curves. If all vectors are along one axis, the number of
+    full turns is the best one.
+    """
+    speeds = np.linalg.norm([ends.w0, ends.w1, *(a / 2 for a in accelerations)], axis=-1)
+    fast = speeds.sum(axis=0) > FAST
+    curves = _between_control_points(ends, n)
+    if not fast.any():
+        return curves
+    more = _beside_free_end(ends, n, *accelerations)
+    return curves.joined(more.take(fast[more.problem]))
+
+
+def _between_control_points(ends: Ends, n: int) -> Curves:
+    """Return two curves for each problem that turn from one Bézier control point to the other.
+
+    The control points are C₁ = R0 exp(ŵ0/3) and C₂ = R1 exp(−ŵ1/3). With β = 3t² − 2t³ and a
+    rotation vector v from C₁ to C₂, the curves are
 
         R = C₁ exp(β v̂) exp(η̂),    η = (t³ w1 − (1 − t)³ w0)/3.
+    """
+    t = grid(n).t[:, None]
+    first, last = _bounded(ends.w0) / 3, _bounded(ends.w1) / 3
+    C1 = ends.R0 @ exp_so3(first)
+    v = _both_ways(C1.mT @ ends.R1 @ exp_so3(-last), hint=first + last)
+    turn = _beta(t) * v[:, :, None]
+    eta = t**3 * last[:, None] - (1 - t) ** 3 * first[:, None]
+    return Curves.for_each(C1[:, None] @ exp_so3(turn) @ exp_so3(eta))
+
+
+def _beside_free_end(ends: Ends, n: int, *accelerations: Array) -> Curves:
+    """Return two curves for each problem that follow a motion whose end is free.
 
     Let F be the motion from R0 whose velocity in the fixed frame is the line from R0 w0 to R1 w1
     (or the cubic with the derivatives R0 a0 and R1 a1, if `accelerations` are given). It costs
-    least if the rotation at t = 1 is free. If the ends are fast, two more curves are
+    least if the rotation at t = 1 is free. With β = 3t² − 2t³, the curves are
 
         R = F exp(β v̂),    v from F(1) to R1.
-
-    Each v turns the short way or the long way. The curves do not depend on the choice of frames.
-    The ends R1, R0, −w1, −w0 give the reversed curves. If all vectors are along one axis, the
-    number of full turns is the best one.
     """
-    first, last = (_bounded(w) / 3 for w in (ends.w0, ends.w1))
-    speeds = np.linalg.norm([ends.w0, ends.w1, *(a / 2 for a in accelerations)], axis=-1)
-    fast = speeds.sum(axis=0) > FAST
-    C1 = ends.R0 @ exp_so3(first)
-    F = _with_free_end(ends, n, *accelerations)
-    goals = C1.mT @ ends.R1 @ exp_so3(-last), F[:, -1].mT @ ends.R1
-    v = np.concatenate([_both_ways(goal, first + last) for goal in goals])
     t = grid(n).t[:, None]
-    between = exp_so3(t * t * (3 - 2 * t) * v[:, :, None])
-    over = exp_so3(t**3 * last[:, None] - (1 - t) ** 3 * first[:, None])
-    R = np.concatenate([C1[:, None] @ between[:2] @ over, F @ between[2:]])
-    count = len(C1)
-    problem = np.tile(np.arange(count), 4)
-    used = np.append([True] * (2 * count), np.tile(fast, 2))
-    return problem[used], R.reshape(-1, n, 3, 3)[used]
+    hint = _bounded(ends.w0) / 3 + _bounded(ends.w1) / 3
+    F = _with_free_end(ends, n, *accelerations)
+    v = _both_ways(F[:, -1].mT @ ends.R1, hint)
+    return Curves.for_each(F @ exp_so3(_beta(t) * v[:, :, None]))
 
 
 def _with_free_end(ends: Ends, n: int, *accelerations: Array) -> Array:
-    """Return the motion F of `starts` at n nodes, shape (N, n, 3, 3).
+    """Return the motion F of `_beside_free_end` at n nodes, shape (N, n, 3, 3).
 
     With the velocity L in the fixed frame, a ball turns from t to t + h by
     ∫ L dt − h² (L(t) × L(t + h))/12, to fourth order in h.
     """
-    t, starting = grid(n).t, (ends.R0, ends.R1) * 2
-    rates = map(_bounded, (ends.w0, ends.w1, *accelerations))
-    L = hermite([matvec(R, x) for R, x in zip(starting, rates, strict=False)], t[:, None, None])
-    turn = np.diff(np.tensordot(grid(n).integral, L, axes=1), axis=0)
-    turn -= np.diff(t)[:, None, None] ** 2 / 12 * np.cross(L[:-1], L[1:])
+    t = grid(n).t
+    h = np.diff(t)[:, None, None]
+    rates = [_bounded(x) for x in (ends.w0, ends.w1, *accelerations)]
+    in_room = [matvec(R, x) for R, x in zip((ends.R0, ends.R1) * 2, rates, strict=False)]
+    L = hermite(in_room, t[:, None, None])
+    integral = np.tensordot(grid(n).integral, L, axes=1)
+    turns = np.diff(integral, axis=0) - h**2 / 12 * np.cross(L[:-1], L[1:])
     F = [ends.R0]
-    for step in exp_so3(turn):
-        F.append(step @ F[-1])
+    for turn in exp_so3(turns):
+        F.append(turn @ F[-1])
     return np.stack(F, axis=1)
 
 
@@ -80,21 +182,23 @@ def _both_ways(goal: Array, hint: Array) -> Array:
     """
     v = log(goal)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)
-    other = (angle > (1 - SAME) * np.pi) & (leading_sign(v) < 0)
-    v = np.where(other, v * (1 - 2 * np.pi / np.maximum(angle, 1)), v)
+    half_turn = angle > (1 - SAME) * np.pi
+    opposite = v * (1 - 2 * np.pi / np.maximum(angle, 1))
+    v = np.where(half_turn & (leading_sign(v) < 0), opposite, v)
     along_v = v + 1e-9 * hint
     size = np.linalg.norm(along_v, axis=-1, keepdims=True)
-    return np.stack([v, v - 2 * np.pi * along_v / np.maximum(size, 1e-150)])
+    return np.stack([v, v - 2 * np.pi * along_v / np.maximum(size, TINY)])
 
 
 def leading_sign(v: Array) -> Array:
     """Return the sign of the largest component of v (of the first one, if several are equal)."""
     size = np.abs(v)
-    largest = np.argmax(size > (1 - SAME) * size.max(axis=-1, keepdims=True), axis=-1)
-    return np.sign(np.take_along_axis(v, largest[..., None], axis=-1))
+    is_largest = size > (1 - SAME) * size.max(axis=-1, keepdims=True)
+    first = np.argmax(is_largest, axis=-1)
+    return np.sign(np.take_along_axis(v, first[..., None], axis=-1))
 
 
-def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp], Array]:
+def between_free_motions(ends: Ends, G: Array, n: int) -> Curves:
     """Return two curves at n nodes for each problem; they lead from one free motion to another.
 
     For a body of inertia G, let F be the free motion that starts at R0 with w0, and let B be the
@@ -104,53 +208,59 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> tuple[NDArray[np.intp]
         R = F exp(β v̂)
 
     has the given ends. At t = ½, one v is the shortest logarithm, and the other v turns the other
-    way round. The first result is the problem index of each curve.
+    way round. The logarithms are computed at 2 n − 1 nodes; every second one is a node of R.
     """
     R0 = np.stack([ends.R0, ends.R1])
     w0 = _bounded(np.stack([ends.w0, -ends.w1]))  # B runs backward
-    F, back = np.moveaxis(free_motions(R0, w0, G, grid(2 * n - 1).t), 1, 0)
-    v = _continuous_log(F.mT @ back[::-1])[:, ::2]
-    t = grid(n).t[:, None, None]
-    R = F[::2] @ exp_so3(t * t * (3 - 2 * t) * v)
-    R = np.moveaxis(R, 1, 2).reshape(-1, n, 3, 3)
-    number = np.tile(np.arange(len(ends.w0)), 2)
-    end_rates = np.stack([ends.w0, ends.w1], axis=1)
-    return number, with_ends(R, end_rates[number])
+    motions = free_motions(R0, w0, G, grid(2 * n - 1).t)
+    F, backward = motions[:, 0], motions[:, 1]
+    v = _continuous_log(F.mT @ backward[::-1])[:, ::2]
+    R = F[::2] @ exp_so3(_beta(grid(n).t[:, None, None]) * v)
+    rates = np.stack([ends.w0, ends.w1], axis=1)
+    return Curves.for_each(np.moveaxis(R, 1, 2)).with_ends(rates)
 
 
 def free_motions(R0: Array, w0: Array, G: Array, t: Array) -> Array:
     """Return approximate free motions of bodies of inertia G: R at the times t.
 
-    Euler's equations in principal axes, wᵢ' = (Gⱼ − Gₖ) wⱼ wₖ/Gᵢ, are solved by a Runge–Kutta
-    method that keeps ‖G w‖ constant.
-    From t to t + h, a body turns by ∫ w dt + h² (w(t) × w(t + h))/12, to fourth order in h.
+    From t to t + h, a body turns by ∫ w dt + h² (w(t) × w(t + h))/12, to fourth order in h. The
+    integral is h (w(t) + w(t + h))/2 + h² (w'(t) − w'(t + h))/12.
     """
     moments, axes = np.linalg.eigh(G)
     axes *= np.linalg.det(axes)[..., None, None]  # right-handed
+    w, a = _free_rates(matvec(axes.mT, w0), moments, t)
+    h = np.diff(t).reshape(-1, *(1 for _ in w0.shape))
+    bends = a[:-1] - a[1:] + np.cross(w[:-1], w[1:])
+    R = [R0 @ axes]
+    for turn in exp_so3(h / 2 * (w[1:] + w[:-1]) + h**2 / 12 * bends):
+        R.append(R[-1] @ turn)
+    return np.stack(R) @ axes.mT
+
+
+def _free_rates(w: Array, moments: Array, t: Array) -> tuple[Array, Array]:
+    """Return w and w' of free bodies at the times t, in principal axes, from w at the first time.
+
+    Euler's equations wᵢ' = (Gⱼ − Gₖ) wⱼ wₖ/Gᵢ are solved by the classical Runge–Kutta method. After
+    each step, w is scaled so that ‖G w‖ is constant.
+    """
     after, before = np.array([1, 2, 0]), np.array([2, 0, 1])
     gyration = (moments[..., after] - moments[..., before]) / moments
 
     def rate(w: Array) -> Array:
         return gyration * w.take(after, axis=-1) * w.take(before, axis=-1)
 
-    path = [matvec(axes.mT, w0)]
-    size = np.linalg.norm(moments * path[0], axis=-1)
+    path = [w]
+    momentum = np.linalg.norm(moments * w, axis=-1)
     for h in np.diff(t):
-        w = path[-1]
         k1 = rate(w)
         k2 = rate(w + h / 2 * k1)
         k3 = rate(w + h / 2 * k2)
         k4 = rate(w + h * k3)
         w = w + h / 6 * (k1 + 2 * (k2 + k3) + k4)
         now = np.linalg.norm(moments * w, axis=-1)
-        path.append(w * (size / np.maximum(now, 1e-150))[..., None])
-    w = np.stack(path)
-    a, h = rate(w), np.diff(t).reshape(-1, *(1 for _ in w0.shape))
-    turn = h / 2 * (w[1:] + w[:-1]) + h**2 / 12 * (a[:-1] - a[1:] + np.cross(w[:-1], w[1:]))
-    R = [R0 @ axes]
-    for step in exp_so3(turn):
-        R.append(R[-1] @ step)
-    return np.stack(R) @ axes.mT
+        w = w * (momentum / np.maximum(now, TINY))[..., None]
+        path.append(w)
+    return np.stack(path), rate(np.stack(path))
 
 
 def _continuous_log(R: Array) -> Array:
@@ -161,14 +271,21 @@ def _continuous_log(R: Array) -> Array:
     """
     shortest = log(R)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
-    axis = shortest / np.maximum(angle, 1e-150)
+    axis = shortest / np.maximum(angle, TINY)
     v = np.stack([shortest, shortest - 2 * np.pi * axis])
     middle = len(R) // 2
-    after, before = range(middle + 1, len(R)), range(middle - 1, -1, -1)
-    for i, last in [*((i, i - 1) for i in after), *((i, i + 1) for i in before)]:
+    forward = [(i, i - 1) for i in range(middle + 1, len(R))]
+    backward = [(i, i + 1) for i in reversed(range(middle))]
+    for i, last in forward + backward:
         beyond = np.sum(v[:, last] * axis[i], axis=-1, keepdims=True) - angle[i]
-        v[:, i] = shortest[i] + 2 * np.pi * np.round(beyond / (2 * np.pi)) * axis[i]
+        turns = np.round(beyond / (2 * np.pi))
+        v[:, i] = shortest[i] + 2 * np.pi * turns * axis[i]
     return v
+
+
+def _beta(t: Array) -> Array:
+    """Return β = 3t² − 2t³, which rises from 0 to 1 and is flat at both ends."""
+    return t * t * (3 - 2 * t)
 
 
 def _bounded(w: Array) -> Array:
@@ -176,74 +293,72 @@ def _bounded(w: Array) -> Array:
     return np.clip(w, -1e6, 1e6)
 
 
-def spun(
-    R: Array, ends: Array, G: Array, worth: NDArray[np.bool_]
-) -> tuple[NDArray[np.intp], Array]:
-    """Return curves R with more spin about principal axes of G, and their indices in the stack R.
+def spun(curves: Curves, ends: Array, G: Array, worth: Mask) -> Curves:
+    """Return curves with more spin about the principal axes of the inertia G of each problem.
 
     With γ = 10 t³ − 15 t⁴ + 6 t⁵, the new curves are R exp(φ ê) with φ = ±2π γ (a full turn), for
-    each principal axis e that is `worth` it, shape (N, 3). The axes are ordered by their moments.
-    About the first axis, the curves with φ = ±π (4 t (1 − t))³ (forth and back) are added.
+    each principal axis e for which `worth` of the problem, shape (3,), is True. The axes are
+    ordered by their moments. About the first axis, the curves with φ = ±π (4 t (1 − t))³ (forth and
+    back) are added.
     """
-    t, axes = grid(R.shape[1]).t[:, None], np.linalg.eigh(G)[1].mT
-    turn, swing = 2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2), np.pi * (4 * t * (1 - t)) ** 3
-    index, axis = np.nonzero(worth)
-    again = np.flatnonzero(worth[:, 0])
-    turns = [turn * axes[index, axis][:, None], swing * axes[again, 0][:, None]]
-    more, index = exp_so3(np.concatenate(turns)), np.append(index, again)
-    index = np.tile(index, 2)
-    curves = R[index] @ np.concatenate([more, more.mT])
-    return index, with_ends(curves, ends[index])
+    t = grid(curves.nodes).t[:, None]
+    turn = 2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2)
+    swing = np.pi * (4 * t * (1 - t)) ** 3
+    axes = np.linalg.eigh(G[curves.problem])[1].mT
+    turning, axis = np.nonzero(worth[curves.problem])
+    swinging = np.flatnonzero(worth[curves.problem, 0])
+    turns = turn * axes[turning, axis][:, None]
+    swings = swing * axes[swinging, 0][:, None]
+    more = exp_so3(np.concatenate([turns, swings]))
+    new = curves.take(np.tile(np.append(turning, swinging), 2))
+    return Curves.of(new.problem, new.R @ np.concatenate([more, more.mT])).with_ends(ends)
 
 
-def with_ends(R: Array, ends: Array) -> Array:
-    """Multiply the curves R by factors exp(η̂) that correct w0, w1 and, if given, a0, a1.
+class Steps(NamedTuple):
+    """The limits of Gauss–Newton steps.
 
-    On too few nodes, the polynomials through R have other end velocities than w0 and w1; Δw₀ and
-    Δw₁ are the differences. The factor for velocities has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁. For
-    accelerations, a second factor has η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁.
+    At most `most` steps are made. They end when one of them lowers the cost by less than the
+    fraction `worthwhile`.
     """
-    t = grid(R.shape[1]).t[:, None]
-    for order in range(1, 1 + ends.shape[1] // 2):
-        now = rates_of(R, order)[-1][:, [0, -1]]
-        lacking0, lacking1 = np.moveaxis(_bounded(ends[:, 2 * order - 2 : 2 * order] - now), 1, 0)
-        share = (t * (1 - t)) ** order / order
-        change = (1 - t) * lacking0[:, None] + (-1) ** order * t * lacking1[:, None]
-        R = R @ exp_so3(share * change)
-    return R
+
+    most: int
+    worthwhile: float
 
 
-def lowered(functional: Functional, R: Array, steps: int, worthwhile: float) -> tuple[Array, Array]:
-    """Lower the costs of curves by Gauss–Newton steps; return the curves and their costs.
+def lowered(functional: Functional, curves: Curves, steps: Steps) -> Curves:
+    """Lower the costs of curves by Gauss–Newton steps.
 
     For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation u
     changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step uses the η that minimises
     the integral of the squared new deviation. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the ends, and
     p has half as many coefficients as there are nodes. A quarter of η or three times η is used
-    instead if the curve then costs less. The steps end when one of them lowers the cost by less
-    than the fraction `worthwhile`.
+    instead if the curve then costs less.
     """
-    R, cost, active = R.copy(), cost_at_nodes(functional, R), np.arange(len(R))
-    for _ in range(steps):
+    of_curves = functional.take(curves.problem)
+    R, cost = curves.R.copy(), cost_at_nodes(of_curves, curves.R)
+    active = np.arange(len(curves))
+    for _ in range(steps.most):
         before = cost[active]
         for part in blocks(len(active), TOGETHER):
-            index = active[part]
-            R[index], cost[index] = _lower(functional.take(index), R[index], cost[index])
-        active = active[cost[active] < (1 - worthwhile) * before]
+            some = active[part]
+            R[some], cost[some] = _lower(of_curves.take(some), R[some], cost[some])
+        active = active[cost[active] < (1 - steps.worthwhile) * before]
         if not len(active):
             break
-    return R, cost
+    return Curves(curves.problem, R, cost)
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
     """Return the cheaper of R and the best curve after a step times `SHARES`, and its cost."""
+    each = np.arange(len(R))
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
-    number = np.tile(np.arange(len(R)), len(SHARES))
-    costs = cost_at_nodes(functional.take(number), tried.reshape(-1, *R.shape[1:]))
-    tried, costs = np.concatenate([R[None], tried]), np.vstack([cost, costs.reshape(-1, len(R))])
-    best = np.fmin(costs, np.inf).argmin(axis=0), np.arange(len(R))
-    return tried[best], costs[best]
+    of_tried = functional.take(np.tile(each, len(SHARES)))
+    costs = cost_at_nodes(of_tried, tried.reshape(-1, *R.shape[1:]))
+    tried = np.concatenate([R[None], tried])
+    costs = np.vstack([cost, costs.reshape(-1, len(R))])
+    best = np.fmin(costs, np.inf).argmin(axis=0)  # NaN counts as inf
+    return tried[best, each], costs[best, each]
 
 
 def _best_change(functional: Functional, R: Array) -> Array:

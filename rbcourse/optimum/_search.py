@@ -1,14 +1,27 @@
-"""The search for the cheapest curve: Newton's method from many starting curves (starts)."""
+"""The search for the cheapest curve of each problem in a stack.
+
+Among all curves R(t) on SO(3) with given ends, the search looks for the one with the least
+
+    ∫ ‖u‖² dt,    where u depends on w, w' and, for the jerk, w'' (`curves.functionals`).
+
+Such a curve is stationary: R p = c is constant. This equation has many solutions, and Newton's
+method (`_collocation`) finds one of them near its start. So the search
+
+1. makes starting curves (`_guesses`), and lowers their costs by Gauss–Newton steps,
+2. for a body, adds spin about the principal axes to the cheapest ones,
+3. solves R p = c by Newton's method from the cheapest ones,
+4. repeats this on more nodes if there is no solution, or if one of the curves costs less,
+5. for a body, bends solutions that turn about one axis, since they may be saddles.
+
+`ball`, `body` and `jerk` make a `Task`, and `cheapest` solves it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbcourse._chebyshev import grid
 from rbcourse._numerics import EPS, Array
@@ -29,304 +42,280 @@ from rbcourse.optimum._collocation import (
 )
 from rbcourse.optimum._guesses import (
     SAME,
+    Curves,
+    Mask,
+    Numbers,
+    Steps,
     between_free_motions,
     leading_sign,
     lowered,
     spun,
     starts,
-    with_ends,
 )
 from rbcourse.projection import nearest
 from rbcourse.so3 import log
 
-Numbers: TypeAlias = NDArray[np.intp]
+Result: TypeAlias = Solution | Failure
+Results: TypeAlias = list[Result]
 NOTHING = Failure(np.inf, 0)
 
 
-@dataclass(frozen=True)
 class Limits:
     """The parameters of the search. Ratios are costs divided by the lowest cost; angles are in rad.
 
-    A pair (steps, share) limits the Gauss–Newton steps: at most `steps` steps are made, and they
-    end when one of them lowers the cost by less than the fraction `share`.
+    `Steps` limit the Gauss–Newton steps.
     """
 
-    nodes: int = 17  # nodes of starting curves, and of the linear systems of a ball
-    nodes_for_rods: int = 25  # with 17 nodes, 2 more of 100 rods miss their optima
-    rod: float = 3.0  # a body whose moments have a larger ratio is a rod
-    nodes_for_spin: int = 8  # the number of nodes that are added if spin is added
-    nodes_for_jerk: int = 29  # the jerk needs more, since it has higher derivatives
-    more_nodes: tuple[int, int] = (33, 65)  # for fast problems, and if a start costs less
-    fast: tuple[float, float] = (24.0, 80.0)  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used
-    followed: float = 1.1  # Newton's method starts from curves up to this cost ratio
-    followed_of_bodies: float = 1.02  # the same for bodies; their curves have more nodes
-    same_entries: float = 0.1  # starts count as equal if all entries of R differ by less than this
-    known_cost: float = 1.01  # largest accepted ratio of a solution's cost to a start's cost
-    one_start: float = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
-    flat: float = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
-    bend: float = 0.5  # rad: size of the bend
-    refined: float = 3.0  # curves up to this cost ratio are lowered on more nodes
-    spun: tuple[float, ...] = (3.0, 1.15)  # spin is added twice, to curves up to these cost ratios
-    worth_a_turn: float = 0.3  # no spin is added if the cost is below this share of a turn's cost
-    promising: float = 1.3  # curves above this cost ratio are dropped before more steps
-    starts: tuple[int, float] = (40, 5e-4)
-    brief: tuple[int, float] = (4, 5e-4)  # steps for new curves, before most are dropped
-    starts_of_bodies: tuple[int, float] = (20, 2e-3)
-    on_more_nodes: tuple[int, float] = (60, 1e-4)
-    bent: tuple[int, float] = (40, 1e-6)  # steps for bent curves, which may be near a saddle
-    last: tuple[int, float] = (200, 0.0)  # used if the other pairs do not suffice
+    nodes = 17  # nodes of starting curves, and of the linear systems of a ball
+    nodes_for_rods = 25  # with 17 nodes, 2 more of 100 rods miss their optima
+    rod = 3.0  # a body whose moments have a larger ratio is a rod
+    nodes_for_spin = 8  # the number of nodes that are added if spin is added
+    nodes_for_jerk = 29  # the jerk needs more, since it has higher derivatives
+    more_nodes = 33, 65  # for fast problems, and if a start costs less
+    fast = 24.0, 80.0  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used
+    followed = 1.1  # Newton's method starts from curves up to this cost ratio
+    followed_of_bodies = 1.02  # the same for bodies; their curves have more nodes
+    same_entries = 0.1  # starts count as equal if all entries of R differ by less than this
+    known_cost = 1.01  # largest accepted ratio of a solution's cost to a start's cost
+    one_start = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices
+    flat = 0.1  # if w deviates from its axis by less than this share, bent curves are tried
+    bend = 0.5  # rad: size of the bend
+    refined = 3.0  # curves up to this cost ratio are lowered on more nodes
+    spun = 3.0, 1.15  # spin is added twice, to curves up to these cost ratios
+    worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost
+    promising = 1.3  # curves above this cost ratio are dropped before more steps
+    starts = Steps(40, 5e-4)
+    brief = Steps(4, 5e-4)  # steps for new curves, before most are dropped
+    starts_of_bodies = Steps(20, 2e-3)
+    on_more_nodes = Steps(60, 1e-4)
+    bent = Steps(40, 1e-6)  # steps for bent curves, which may be near a saddle
+    last = Steps(200, 0.0)  # used if the other steps do not suffice
 
 
 LIMITS = Limits()
 
 
 class Task(NamedTuple):
-    """A stack of problems with one batch axis, and the functions that solve them.
-
-    If the functional is an `Effort`, the search also adds spin to the starts, and bends
-    solutions that turn about one axis, because such solutions may be saddles.
-    """
+    """A stack of problems with one batch axis, and the functions that solve them."""
 
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: Equations
-    # a call with problem indices and n returns the problem of each start, and the starts at n nodes
-    starts: Callable[[Numbers, int], tuple[Numbers, Array]]
-    solver: Callable[[Any, Array], list[Solution | Failure]] = relax
-    nodes: Any = LIMITS.nodes  # of starting curves, for all problems or for each one
-    known: Mapping[int, Solution] = MappingProxyType({})  # solutions that are already known
+    # A call with some problems and n returns curves on n nodes. Their `problem` is a place in the
+    # list of problems.
+    starts: Callable[[Numbers, int], Curves]
+    solver: Callable[[Any, Array], Results]  # Newton's method
+    nodes: Any  # the number of nodes of starting curves, for all problems or for each one
+    known: dict[int, Result]  # solutions that are already known, and failures, by problem number
 
 
-def ball(given: Ends) -> Task:
-    """Return the problems of minimum acceleration for a ball."""
-    ends, rates = _flat(given, given.w0, given.w1)
-    equations = BallStationary(ends.R0, ends.R1, rates)
-    return Task(
-        given.w0.shape[:-1],
-        BallAcceleration(),
-        equations,
-        lambda index, n: starts(ends.take(index), n),
-        relax_ball,
-        known=_of_slow_ends(ends, equations),
-    )
-
-
-def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution]:
-    """Solve problems with small σ, w0 and w1 from one start; return solutions by problem index.
-
-    If the entries of σ, w0 and w1 are below ½, their norms are below 1. With e = σ − (w0 + w1)/2
-    and d = w1 − w0, the optimum then costs about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve that turns
-    the long way between such ends has a length of at least 2π − 1 and costs at least
-    12 (2π − 2)² > 200. No second stationary curve that turns the short way was found, but a proof
-    is missing.
-    """
-    largest = np.abs([log(ends.turn), ends.w0, ends.w1]).max(axis=(0, 2))
-    slow = np.flatnonzero(largest < LIMITS.one_start)
-    if not len(slow):
-        return {}
-    curves = corrected_bezier(*ends.take(slow))
-    R = np.ascontiguousarray(curves(grid(LIMITS.nodes).t).swapaxes(0, 1))
-    found = relax_ball(equations.take(slow), R)
-    each = zip(slow.tolist(), found, strict=True)
-    return {i: one for i, one in each if isinstance(one, Solution)}
-
-
-def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
-    """Return the problems of minimum acceleration, or of minimum torque, for bodies of inertia G.
-
-    The starting curves include the optimum of a ball and curves between free motions. If G is a
-    multiple of I, the optimum of the ball is the solution.
-    """
-    ends, rates = _flat(given, given.w0, given.w1)
-    functional = Effort(G.reshape(-1, 3, 3), of_torque=of_torque)
-    of_ball = dict(enumerate(cheapest(ball(given))))
-    curves = {i: one for i, one in of_ball.items() if isinstance(one, Solution)}
-    moments = np.linalg.eigvalsh(functional.G)
-    round_ones = np.abs(functional.G - np.eye(3)).max(axis=(1, 2)) < 8 * EPS
-
-    def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
-        problem, R = starts(ends.take(index), n)
-        number, free = between_free_motions(ends.take(index), functional.G[index], n)
-        more = [k for k, i in enumerate(index) if i in curves]
-        of_balls = [on_nodes(curves[index[k]].R[None], n) for k in more]
-        return np.concatenate([problem, number, np.array(more, int)]), np.concatenate(
-            [R, free, *of_balls]
-        )
-
-    return Task(
-        given.w0.shape[:-1],
-        functional,
-        Stationary(functional, ends.R0, ends.R1, rates),
-        start,
-        nodes=np.where(
-            moments[:, 2] > LIMITS.rod * moments[:, 0], LIMITS.nodes_for_rods, LIMITS.nodes
-        ),
-        known={i: one for i, one in curves.items() if round_ones[i]},
-    )
-
-
-def jerk(given: Ends, a0: Array, a1: Array) -> Task:
-    """Return the problems of minimum jerk."""
-    ends, rates = _flat(given, given.w0, given.w1, a0, a1)
-
-    def start(index: Numbers, n: int) -> tuple[Numbers, Array]:
-        return starts(ends.take(index), n, *rates[index, 2:].swapaxes(0, 1))
-
-    equations = Stationary(Jerk(), ends.R0, ends.R1, rates)
-    return Task(given.w0.shape[:-1], Jerk(), equations, start, nodes=LIMITS.nodes_for_jerk)
-
-
-def _flat(given: Ends, *rates: Array) -> tuple[Ends, Array]:
-    """Return the ends with one batch axis and exact rotations, and the end values (N, m, 3)."""
-    ends = given.flat()
-    R0, R1 = (nearest(R)[0] for R in ends[:2])  # Newton's method fails if R has few correct digits
-    return ends._replace(R0=R0, R1=R1), np.stack([x.reshape(-1, 3) for x in rates], axis=1)
-
-
-def cheapest(task: Task) -> list[Solution | Failure]:
-    """Return the cheapest solution that is found for each problem.
-
-    Gauss–Newton steps lower the costs of the starts, and Newton's method continues from the
-    cheapest ones. Where no solution is found, or where a start costs less than the solution, the
-    search is repeated on more nodes. If this fails, more steps are made.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        return _searched(task)
-
-
-def _searched(task: Task) -> list[Solution | Failure]:
-    ends = task.equations.ends
-    found: list[Solution | Failure] = [task.known.get(i, NOTHING) for i in range(len(ends))]
-    index = np.flatnonzero([one is NOTHING for one in found])
-    share = np.array([1, 1, 1 / 6, 1 / 6])[: ends.shape[1]]  # weights of w and w' in a quintic
-    speed = np.linalg.norm(ends, axis=-1) @ share
-    fast, very_fast = LIMITS.fast
-    nodes = np.select(
-        [~(speed <= very_fast), ~(speed <= fast)], LIMITS.more_nodes[::-1], task.nodes
-    )
-    for n in np.unique(nodes[index]).tolist():
-        some = index[nodes[index] == n]
-        _search(task, some, n, (some[:0], np.empty((0, n, 3, 3))), found)
-    if isinstance(task.functional, Effort):
-        _leave_the_axis(task, task.functional, index, found)
-    return found
-
-
-def _search(
-    task: Task,
-    index: Numbers,
-    n: int,
-    known: tuple[Numbers, Array],
-    found: list[Solution | Failure],
-) -> None:
-    """Search with n nodes, also from the `known` curves; then with more nodes, where this fails."""
-    problem, R, cost = _lowered_starts(task, index, n, *known)
+@np.errstate(over="ignore", invalid="ignore")
+def cheapest(task: Task) -> Results:
+    """Return the cheapest solution that is found for each problem."""
     of_bodies = isinstance(task.functional, Effort)
-    ratio = LIMITS.followed_of_bodies if of_bodies else LIMITS.followed
-    likely = _promising(ratio, len(found), problem, R, cost)
-    _follow(task, problem[likely], R[likely], found)
-    bound = LIMITS.known_cost * _least(len(found), problem, cost)
-    costly = index[_costs(found)[index] > bound[index]]
-    if not len(costly):
-        return
-    for more in LIMITS.more_nodes:
-        if more > n:
-            return _search(task, costly, more, (problem, R), found)
-    some = np.isin(problem, costly)
-    R, _ = lowered(task.functional.take(problem[some]), R[some], *LIMITS.last)
-    _follow(task, problem[some], R, found)
-    for i in costly[_costs(found)[costly] > bound[costly]]:
-        if isinstance(one := found[i], Solution):
-            found[i] = one._replace(beaten=True)
+    search = BodySearch(task) if of_bodies else Search(task)
+    return search.run()
 
 
-def _lowered_starts(
-    task: Task, index: Numbers, n: int, problem: Numbers, R: Array
-) -> tuple[Numbers, Array, Array]:
-    """Return curves of low cost for some problems, and their costs; n is the number of nodes.
+class Search:
+    """The search for the cheapest solutions of a task; `found` has the best ones so far."""
 
-    The curves come from the starts at n nodes and from the curves R of an earlier search.
-    """
-    more, starting = task.starts(index, n)
-    again = np.isin(problem, index)
-    problem = np.append(index[more], problem[again])
-    R = np.concatenate([starting, on_nodes(R[again], n)])
-    R = with_ends(R, task.equations.ends[problem])
-    steps = LIMITS.starts_of_bodies if isinstance(task.functional, Effort) else LIMITS.starts
-    R, cost = lowered(task.functional.take(problem), R, *steps)
-    if isinstance(task.functional, Effort):
-        return _with_more_spin(task, task.functional, problem, R, cost)
-    return problem, R, cost
+    first_steps = LIMITS.starts
+    followed = LIMITS.followed
+
+    def __init__(self, task: Task) -> None:
+        self.task = task
+        self.functional: Any = task.functional
+        self.ends = task.equations.ends
+        self.count = len(self.ends)
+        self.found: Results = [NOTHING] * self.count
+        for i, one in task.known.items():
+            if isinstance(one, Solution):
+                self.found[i] = one
+        unknown = [one is NOTHING for one in self.found]
+        self.unknown = np.flatnonzero(unknown)
+
+    def run(self) -> Results:
+        """Search for the solutions that are not known, and return all solutions."""
+        nodes = self.first_nodes()[self.unknown]
+        for n in np.unique(nodes).tolist():
+            self.search(self.unknown[nodes == n], n)
+        return self.found
+
+    def first_nodes(self) -> Numbers:
+        """Return the number of nodes on which the search begins, for each problem."""
+        sizes = np.linalg.norm(self.ends, axis=-1)
+        weights = np.array([1, 1, 1 / 6, 1 / 6])  # of w and w' in a quintic
+        speed = sizes @ weights[: sizes.shape[1]]
+        nodes = self.task.nodes
+        for fast, more in zip(LIMITS.fast, LIMITS.more_nodes, strict=True):
+            nodes = np.where(speed > fast, more, nodes)
+        return np.asarray(nodes)
+
+    def search(self, problems: Numbers, n: int) -> None:
+        """Search with n nodes; then with more nodes, and with more steps, where this fails."""
+        curves = Curves.none(n)
+        for nodes in n, *(more for more in LIMITS.more_nodes if more > n):
+            curves = self.cheap_curves(problems, nodes, curves)
+            likely = self.promising(curves, self.followed)
+            self.follow(curves.take(likely))
+            problems = self.too_costly(problems, curves)
+            if not len(problems):
+                return
+        self.search_longer(problems, curves)
+
+    def search_longer(self, problems: Numbers, curves: Curves) -> None:
+        """Follow all curves after more Gauss–Newton steps; mark solutions that still cost more."""
+        some = np.isin(curves.problem, problems)
+        lower = lowered(self.functional, curves.take(some), LIMITS.last)
+        self.follow(lower)
+        for i in self.too_costly(problems, curves):
+            one = self.found[i]
+            if isinstance(one, Solution):
+                self.found[i] = one._replace(beaten=True)
+
+    def cheap_curves(self, problems: Numbers, n: int, known: Curves) -> Curves:
+        """Return curves of low cost on n nodes, from the starts and from known curves."""
+        again = np.isin(known.problem, problems)
+        known = known.take(again).on_nodes(n)
+        curves = self.task.starts(problems, n)
+        curves = curves.renumbered(problems).joined(known)
+        curves = curves.with_ends(self.ends)
+        return lowered(self.functional, curves, self.first_steps)
+
+    def promising(self, curves: Curves, ratio: float) -> Mask:
+        """Tell which curves have a cost up to this ratio, and are not close to a cheaper curve."""
+        least = curves.least(self.count)
+        costly = curves.cost > ratio * least[curves.problem]
+        return ~costly & ~_repeated(curves)
+
+    def follow(self, curves: Curves) -> None:
+        """Start Newton's method from these curves, and keep the solutions that cost less.
+
+        If two solutions have the same cost, the first one is kept, so that rounding does not
+        choose.
+        """
+        equations = self.task.equations.take(curves.problem)
+        solutions = self.task.solver(equations, curves.R)
+        for i, one in zip(curves.problem, solutions, strict=True):
+            best = self.found[i]
+            if best is NOTHING or one.cost < (1 - SAME) * best.cost:
+                self.found[i] = one
+
+    def too_costly(self, problems: Numbers, curves: Curves) -> Numbers:
+        """Return the problems without a solution that costs as little as the curves."""
+        bound = LIMITS.known_cost * curves.least(self.count)
+        failed = self.costs() > bound
+        return problems[failed[problems]]
+
+    def costs(self) -> Array:
+        """Return the cost of the solution of each problem; it is inf if there is none."""
+        return np.array([one.cost for one in self.found])
 
 
-def _with_more_spin(
-    task: Task, effort: Effort, problem: Numbers, R: Array, cost: Array
-) -> tuple[Numbers, Array, Array]:
-    """Lower the costs of the cheapest curves, also with more spin, on more nodes.
-
-    The optima of rods differ mainly in the angle about the axis of the least moment. From rest to
-    rest, a full turn costs at least 12 (2π)² λ, where λ is the least eigenvalue of G M G. No spin
-    is added if the cheapest curve costs less than `worth_a_turn` times this cost.
-    """
-    ends, count = task.equations.ends, len(task.equations.ends)
-    full_turn = 12 * (2 * np.pi) ** 2 * np.linalg.eigvalsh(effort.G @ effort.M @ effort.G)
-    worth = _least(count, problem, cost)[:, None] > LIMITS.worth_a_turn * full_turn
-    if not worth[problem].any():
-        return problem, R, cost
-    some = _promising(LIMITS.refined, count, problem, R, cost)
-    problem, R = problem[some], on_nodes(R[some], R.shape[1] + LIMITS.nodes_for_spin)
-    R, cost = lowered(effort.take(problem), with_ends(R, ends[problem]), *LIMITS.on_more_nodes)
-    old = 0
-    for ratio in LIMITS.spun:
-        some = _promising(ratio, count, problem, R, cost) & worth[problem, 0]
-        some[:old] = False
-        if not some.any():
-            break
-        old, number = len(some), problem[some]
-        index, more = spun(R[some], ends[number], effort.G[number], worth[number])
-        number = number[index]
-        more, briefly = lowered(effort.take(number), more, *LIMITS.brief)
-        problem, R = np.append(problem, number), np.concatenate([R, more])
-        cost = np.append(cost, briefly)
-        kept = _promising(LIMITS.promising, count, problem, R, cost)
-        kept[:old] = True
-        problem, R, cost = problem[kept], R[kept], cost[kept]
-        R[old:], cost[old:] = lowered(effort.take(problem[old:]), R[old:], *LIMITS.on_more_nodes)
-    return problem, R, cost
+def _repeated(curves: Curves) -> Mask:
+    """Tell which curves are close, at all nodes, to a cheaper curve of the same problem."""
+    order = np.lexsort((curves.cost, curves.problem))
+    problem, R = curves.problem[order], curves.R[order]
+    repeated = np.zeros(len(order), bool)
+    most = np.bincount(problem, minlength=1).max()
+    for after in range(1, most):
+        same = problem[after:] == problem[:-after]
+        gap = np.abs(R[after:] - R[:-after])
+        near = gap.max(axis=(1, 2, 3)) < LIMITS.same_entries
+        repeated[order[after:]] |= same & near
+    return repeated
 
 
-def _promising(
-    ratio: float, count: int, problem: Numbers, R: Array, cost: Array
-) -> NDArray[np.bool_]:
-    """Tell which curves have a cost up to this ratio, and are not close to a cheaper curve."""
-    least = _least(count, problem, cost)
-    return ~(cost > ratio * least[problem]) & ~_repeated(problem, cost, R)
+class BodySearch(Search):
+    """The search for a body, which also adds spin to the curves and bends some solutions."""
 
+    first_steps = LIMITS.starts_of_bodies
+    followed = LIMITS.followed_of_bodies
 
-def _leave_the_axis(
-    task: Task, effort: Effort, index: Numbers, found: list[Solution | Failure]
-) -> None:
-    """Bend solutions whose axis is almost constant; start Newton's method from cheaper bent curves.
+    def run(self) -> Results:
+        """Search for the solutions that are not known, and try to leave their axes."""
+        super().run()
+        self.leave_the_axis()
+        return self.found
 
-    Such a solution may be a saddle. If all starts turn about one axis, no step leaves the axis,
-    even if a curve that leaves it costs less.
-    """
-    order, t = task.functional.ends // 2 + 1, grid(LIMITS.nodes).t
-    problem, bent = [], [np.empty((0, LIMITS.nodes, 3, 3))]
-    for i in index:
-        one = found[i]
-        if isinstance(one, Solution):
-            w = rates_at_nodes(task.equations.ends[i][None], one.k[None])[0][0]
-            size = np.linalg.svd(w, compute_uv=False)
-            if size[0] > 0 and size[1] < LIMITS.flat * size[0]:
-                sides = LIMITS.bend * _across(w / size[0], effort.G[i])[:, None]
-                turn = (4 * t * (1 - t))[:, None] ** order * sides
-                bent.append(on_nodes(one.R[None], LIMITS.nodes) @ cayley(turn))
-                problem += [i] * len(sides)
-    number = np.array(problem, int)
-    R, cost = lowered(task.functional.take(number), np.concatenate(bent), *LIMITS.bent)
-    cheaper = cost < (1 - SAME) * _costs(found)[number]
-    _follow(task, number[cheaper], R[cheaper], found)
+    def cheap_curves(self, problems: Numbers, n: int, known: Curves) -> Curves:
+        """Return curves of low cost; if spin is worth it, they have more nodes, and some spin more.
+
+        The optima of rods differ mainly in the angle about the axis of the least moment.
+        """
+        curves = super().cheap_curves(problems, n, known)
+        worth = self.worth_a_turn(curves)
+        if not worth[curves.problem].any():
+            return curves
+        some = self.promising(curves, LIMITS.refined)
+        more = curves.nodes + LIMITS.nodes_for_spin
+        curves = curves.take(some).on_nodes(more)
+        curves = curves.with_ends(self.ends)
+        curves = lowered(self.functional, curves, LIMITS.on_more_nodes)
+        return self.spun(curves, worth)
+
+    def worth_a_turn(self, curves: Curves) -> Mask:
+        """Tell for each problem and principal axis whether a turn may be worth its cost.
+
+        From rest to rest, a full turn costs at least 12 (2π)² λ, where λ is an eigenvalue of G M G.
+        A turn is not worth it if the cheapest curve costs less than a share of this cost.
+        """
+        G, M = self.functional.G, self.functional.M
+        eigenvalues = np.linalg.eigvalsh(G @ M @ G)
+        full_turn = 12 * (2 * np.pi) ** 2 * eigenvalues
+        least = curves.least(self.count)
+        return least[:, None] > LIMITS.worth_a_turn * full_turn
+
+    def spun(self, curves: Curves, worth: Mask) -> Curves:
+        """Return the curves and promising ones that spin more; those are spun again."""
+        old = 0  # the number of curves that are already spun
+        for ratio in LIMITS.spun:
+            some = self.promising(curves, ratio)
+            some &= worth[curves.problem, 0]
+            some[:old] = False
+            if not some.any():
+                break
+            old = len(curves)
+            new = spun(curves.take(some), self.ends, self.functional.G, worth)
+            new = lowered(self.functional, new, LIMITS.brief)
+            every = curves.joined(new)
+            kept = self.promising(every, LIMITS.promising)
+            kept[:old] = False
+            new = lowered(self.functional, every.take(kept), LIMITS.on_more_nodes)
+            curves = curves.joined(new)
+        return curves
+
+    def leave_the_axis(self) -> None:
+        """Bend solutions whose axis is almost constant; follow bent curves that cost less.
+
+        Such a solution may be a saddle. If all starts turn about one axis, no step leaves the axis,
+        even if a curve that leaves it costs less.
+        """
+        bent = [self.bent(i) for i in self.unknown.tolist()]
+        curves = Curves.none(LIMITS.nodes).joined(*bent)
+        curves = lowered(self.functional, curves, LIMITS.bent)
+        bound = (1 - SAME) * self.costs()
+        cheaper = curves.cost < bound[curves.problem]
+        self.follow(curves.take(cheaper))
+
+    def bent(self, i: int) -> Curves:
+        """Return four curves beside a solution whose axis is almost constant; otherwise none."""
+        n = LIMITS.nodes
+        one = self.found[i]
+        if isinstance(one, Failure):
+            return Curves.none(n)
+        rates = rates_at_nodes(self.ends[[i]], one.k[None])
+        w = rates[0][0]
+        size, second, _ = np.linalg.svd(w, compute_uv=False)
+        if size == 0 or second >= LIMITS.flat * size:
+            return Curves.none(n)
+        t = grid(n).t[:, None]
+        bump = (4 * t * (1 - t)) ** 2
+        sides = LIMITS.bend * _across(w / size, self.functional.G[i])
+        R = on_nodes(one.R[None], n) @ cayley(bump * sides[:, None])
+        problem = np.full(len(sides), i)
+        return Curves.of(problem, R)
 
 
 def _across(w: Array, G: Array) -> Array:
@@ -336,38 +325,117 @@ def _across(w: Array, G: Array) -> Array:
     determines the directions. If the moments are equal, the order of the axes determines the
     directions.
     """
-    leans = np.concatenate([w, 1e-6 * (G + 1e-3 * np.diag([3, 2, 1]))])
-    axes = np.linalg.svd(leans, full_matrices=False)[2][1:]
-    axes *= leading_sign(axes)
-    return np.concatenate([axes, -axes])
+    order = np.diag([3, 2, 1])
+    weak = 1e-6 * (G + 1e-3 * order)
+    leans = np.concatenate([w, weak])
+    _, _, axes = np.linalg.svd(leans, full_matrices=False)
+    sides = axes[1:] * leading_sign(axes[1:])
+    return np.concatenate([sides, -sides])
 
 
-def _costs(found: list[Solution | Failure]) -> Array:
-    return np.array([one.cost for one in found])
+def ball(given: Ends) -> Task:
+    """Return the problems of minimum acceleration for a ball."""
+    ends, rates = _flat(given)
+    equations = BallStationary(ends.R0, ends.R1, rates)
+    return Task(
+        batch=given.w0.shape[:-1],
+        functional=BallAcceleration(),
+        equations=equations,
+        starts=lambda problems, n: starts(ends.take(problems), n),
+        solver=relax_ball,
+        nodes=LIMITS.nodes,
+        known=_of_slow_ends(ends, equations),
+    )
 
 
-def _least(count: int, problem: Numbers, cost: Array) -> Array:
-    """Return the cost of the cheapest start of each problem."""
-    least = np.full(count, np.inf)
-    np.fmin.at(least, problem, cost)
-    return least
+def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Result]:
+    """Solve problems with small σ, w0 and w1 from one start; return solutions by problem index.
 
-
-def _repeated(problem: Numbers, cost: Array, R: Array) -> NDArray[np.bool_]:
-    """Tell which starts are close, at all nodes, to a cheaper start of the same problem."""
-    order, repeated = np.lexsort((cost, problem)), np.zeros(len(problem), bool)
-    number, R = problem[order], R[order]
-    for after in range(1, np.bincount(problem, minlength=1).max()):
-        near = np.abs(R[after:] - R[:-after]).max(axis=(1, 2, 3)) < LIMITS.same_entries
-        repeated[order[after:]] |= near & (number[after:] == number[:-after])
-    return repeated
-
-
-def _follow(task: Task, problem: Numbers, R: Array, found: list[Solution | Failure]) -> None:
-    """Solve the problems from these curves; cheaper solutions replace those in `found`.
-
-    If two solutions have the same cost, the first one is kept, so that rounding does not choose.
+    If the entries of σ, w0 and w1 are below ½, their norms are below 1. With e = σ − (w0 + w1)/2
+    and d = w1 − w0, the optimum then costs about ∫ ‖w'‖² = 12 ‖e‖² + ‖d‖² < 52. A curve that turns
+    the long way between such ends has a length of at least 2π − 1 and costs at least
+    12 (2π − 2)² > 200. No second stationary curve that turns the short way was found, but a proof
+    is missing.
     """
-    for i, one in zip(problem, task.solver(task.equations.take(problem), R), strict=True):
-        if found[i] is NOTHING or one.cost < (1 - SAME) * found[i].cost:
-            found[i] = one
+    sizes = np.abs([log(ends.turn), ends.w0, ends.w1])
+    slow = np.flatnonzero(sizes.max(axis=(0, 2)) < LIMITS.one_start)
+    if not len(slow):
+        return {}
+    curves = corrected_bezier(*ends.take(slow))
+    R = curves(grid(LIMITS.nodes).t).swapaxes(0, 1)
+    found = relax_ball(equations.take(slow), np.ascontiguousarray(R))
+    return dict(zip(slow.tolist(), found, strict=True))
+
+
+def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
+    """Return the problems of minimum acceleration, or of minimum torque, for bodies of inertia G.
+
+    The starting curves include the optimum of a ball and curves between free motions. If G is a
+    multiple of I, the optimum of the ball is the solution.
+    """
+    ends, rates = _flat(given)
+    functional = Effort(G.reshape(-1, 3, 3), of_torque=of_torque)
+    of_balls = cheapest(ball(given))
+    deviation = np.abs(functional.G - np.eye(3))
+    is_ball = deviation.max(axis=(1, 2)) < 8 * EPS
+    moments = np.linalg.eigvalsh(functional.G)
+    is_rod = moments[:, 2] > LIMITS.rod * moments[:, 0]
+
+    def start(problems: Numbers, n: int) -> Curves:
+        some = ends.take(problems)
+        curves = starts(some, n)
+        free = between_free_motions(some, functional.G[problems], n)
+        known = _on_nodes([of_balls[i] for i in problems], n)
+        return curves.joined(free, known)
+
+    return Task(
+        batch=given.w0.shape[:-1],
+        functional=functional,
+        equations=Stationary(functional, ends.R0, ends.R1, rates),
+        starts=start,
+        solver=relax,
+        nodes=np.where(is_rod, LIMITS.nodes_for_rods, LIMITS.nodes),
+        known={i: of_balls[i] for i in np.flatnonzero(is_ball).tolist()},
+    )
+
+
+def _on_nodes(results: Results, n: int) -> Curves:
+    """Return the solutions as curves on n nodes; their problems are their places in the list."""
+    curves = []
+    for i, one in enumerate(results):
+        if isinstance(one, Solution):
+            R = on_nodes(one.R[None], n)
+            curves.append(Curves.of(np.array([i]), R))
+    return Curves.none(n).joined(*curves)
+
+
+def jerk(given: Ends, a0: Array, a1: Array) -> Task:
+    """Return the problems of minimum jerk."""
+    ends, rates = _flat(given, a0, a1)
+
+    def start(problems: Numbers, n: int) -> Curves:
+        accelerations = rates[problems, 2:].swapaxes(0, 1)
+        return starts(ends.take(problems), n, *accelerations)
+
+    return Task(
+        batch=given.w0.shape[:-1],
+        functional=Jerk(),
+        equations=Stationary(Jerk(), ends.R0, ends.R1, rates),
+        starts=start,
+        solver=relax,
+        nodes=LIMITS.nodes_for_jerk,
+        known={},
+    )
+
+
+def _flat(given: Ends, *accelerations: Array) -> tuple[Ends, Array]:
+    """Return the ends with one batch axis and exact rotations, and the end values (N, m, 3).
+
+    Newton's method fails if the rotations have few correct digits.
+    """
+    ends = given.flat()
+    R0, _ = nearest(ends.R0)
+    R1, _ = nearest(ends.R1)
+    ends = ends._replace(R0=R0, R1=R1)
+    more = [a.reshape(-1, 3) for a in accelerations]
+    return ends, np.stack([ends.w0, ends.w1, *more], axis=1)
