@@ -61,15 +61,12 @@ NOTHING = Failure(np.inf, 0)
 
 
 class Limits:
-    """The parameters of the search. Ratios are costs divided by the lowest cost; angles are in rad.
-
-    `Steps` limit the Gauss–Newton steps.
-    """
+    """The thresholds. Ratios are costs divided by the lowest cost; angles are in rad."""
 
     nodes = 17  # nodes of starting curves, and of the linear systems of a ball
     nodes_for_rods = 25  # with 17 nodes, 2 more of 100 rods miss their optima
     rod = 3.0  # a body whose moments have a larger ratio is a rod
-    nodes_for_spin = 8  # the number of nodes that are added if spin is added
+    nodes_for_spin = 8  # added to the nodes of starting curves before spin is added
     nodes_for_jerk = 29  # the jerk needs more, since it has higher derivatives
     more_nodes = 33, 65  # for fast problems, and if a start costs less
     fast = 24.0, 80.0  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used
@@ -84,10 +81,10 @@ class Limits:
     spun = 3.0, 1.15  # spin is added twice, to curves up to these cost ratios
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost
     promising = 1.3  # curves above this cost ratio are dropped before more steps
-    starts = Steps(40, 5e-4)
-    brief = Steps(4, 5e-4)  # steps for new curves, before most are dropped
-    starts_of_bodies = Steps(20, 2e-3)
-    on_more_nodes = Steps(60, 1e-4)
+    starts = Steps(40, 5e-4)  # Gauss–Newton steps for starting curves
+    starts_of_bodies = Steps(20, 2e-3)  # the same for bodies; many curves are lowered again
+    on_more_nodes = Steps(60, 1e-4)  # steps for curves of bodies, if spin is added
+    brief = Steps(4, 5e-4)  # steps for curves with more spin, before most are dropped
     bent = Steps(40, 1e-6)  # steps for bent curves, which may be near a saddle
     last = Steps(200, 0.0)  # used if the other steps do not suffice
 
@@ -101,12 +98,10 @@ class Task(NamedTuple):
     batch: tuple[int, ...]  # the shape of the stack
     functional: Functional
     equations: Equations
-    # A call with some problems and n returns curves on n nodes. Their `problem` is a place in the
-    # list of problems.
-    starts: Callable[[Numbers, int], Curves]
+    starts: Callable[[Numbers, int], Curves]  # curves of these problems (numbered 0, 1, …), n nodes
     solver: Callable[[Any, Array], Results]  # Newton's method
     nodes: Any  # the number of nodes of starting curves, for all problems or for each one
-    known: dict[int, Result]  # solutions that are already known, and failures, by problem number
+    known: dict[int, Result]  # results that are already known; failures are ignored
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -192,8 +187,7 @@ class Search:
     def follow(self, curves: Curves) -> None:
         """Start Newton's method from these curves, and keep the solutions that cost less.
 
-        If two solutions have the same cost, the first one is kept, so that rounding does not
-        choose.
+        Of two solutions of the same cost, the first is kept, so that rounding does not choose.
         """
         equations = self.task.equations.take(curves.problem)
         solutions = self.task.solver(equations, curves.R)
@@ -209,7 +203,7 @@ class Search:
         return problems[failed[problems]]
 
     def costs(self) -> Array:
-        """Return the cost of the solution of each problem; it is inf if there is none."""
+        """Return the costs of the solutions; the cost of a missing solution is inf."""
         return np.array([one.cost for one in self.found])
 
 
@@ -253,13 +247,13 @@ class BodySearch(Search):
         curves = curves.take(some).on_nodes(more)
         curves = curves.with_ends(self.ends)
         curves = lowered(self.functional, curves, LIMITS.on_more_nodes)
-        return self.spun(curves, worth)
+        return self.with_spin(curves, worth)
 
     def worth_a_turn(self, curves: Curves) -> Mask:
-        """Tell for each problem and principal axis whether a turn may be worth its cost.
+        """Tell for each problem and principal axis, shape (…, 3), whether spin may lower the cost.
 
         From rest to rest, a full turn costs at least 12 (2π)² λ, where λ is an eigenvalue of G M G.
-        A turn is not worth it if the cheapest curve costs less than a share of this cost.
+        It is not worth it if the cheapest curve costs less than a share of this cost.
         """
         G, M = self.functional.G, self.functional.M
         eigenvalues = np.linalg.eigvalsh(G @ M @ G)
@@ -267,7 +261,7 @@ class BodySearch(Search):
         least = curves.least(self.count)
         return least[:, None] > LIMITS.worth_a_turn * full_turn
 
-    def spun(self, curves: Curves, worth: Mask) -> Curves:
+    def with_spin(self, curves: Curves, worth: Mask) -> Curves:
         """Return the curves and promising ones that spin more; those are spun again."""
         old = 0  # the number of curves that are already spun
         for ratio in LIMITS.spun:
