@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 import rbcourse as rb
 from rbcourse import textbook
-from rbcourse.curves import timing
+from rbcourse.curves import _cells
 
 I4, REST = np.eye(4), np.zeros(3)
 LEMNISCATE = 2.62205755429212  # B(1/4, 1/2)/2
@@ -143,8 +143,8 @@ OPTIMA = {
 
 @pytest.mark.parametrize("name", OPTIMA)
 def test_no_timing_on_the_same_cells_is_faster(name, monkeypatch):
-    monkeypatch.setattr(timing, "REFINEMENTS", 0)
-    monkeypatch.setattr(timing, "TOLERANCE", 0.1)
+    monkeypatch.setattr(_cells, "REFINEMENTS", 0)
+    monkeypatch.setattr(_cells, "TOLERANCE", 0.1)
     for seed, T in enumerate(OPTIMA[name]):
         found = rb.fastest(random_chain(seed), **SETS[name]).domain[1]
         assert -1e-8 < found / T - 1 < 1e-4
@@ -165,9 +165,10 @@ def test_one_limit_is_reached_at_nearly_all_times(name):
     for seed in range(3):
         timed = rb.fastest(random_chain(100 + seed), **SETS[name])
         t = np.linspace(*timed.domain, 100_001)
-        known = timing._limits(timed, **SETS[name])
         V, A, R = (timed(t, order) for order in (1, 2, 0))
-        used = [np.linalg.norm(b + k, axis=-1) for _, _, b, k in known(V, A, R[:, :3, :3])]
+        limits = _cells.as_limits(timed, **SETS[name])
+        vectors = [limit.vectors(V, A, R[:, :3, :3]) for limit in limits]
+        used = [np.linalg.norm(b + k, axis=-1).max(axis=-1) for _, b, k in vectors]
         used = np.max(used, axis=0)  # these are the squares of the shares of speeds
         assert used.max() < 1 + 1e-4
         assert np.mean(used > 0.99) > 0.9
@@ -189,17 +190,17 @@ def test_shares_of_limits_agree_with_the_torque_and_the_force():
     )
     force = (R.mT @ (2.0 * (bend - g))[..., None])[..., 0]
     limits = {"speed": 1, "acceleration": 1, "force": [1, 1, 1], "torque": 1, "inertia": G}
-    known = timing._limits(c, **limits, mass=2.0, centre=r, gravity=g)
-    rows = {}
-    for name, _, b, k in known(V, A, R):
-        rows.setdefault(name, []).append(b + k)
+    used = {}
+    for limit in _cells.as_limits(c, **limits, mass=2.0, centre=r, gravity=g):
+        _, b, k = limit.vectors(V, A, R)
+        used[limit.name] = b + k
     w = V[:, :3]
     torque = A[:, :3] @ G + np.cross(w, w @ G)
-    np.testing.assert_allclose(rows["torque"][0], torque, atol=1e-13)
-    np.testing.assert_allclose(np.hstack(rows["force"]), force, atol=1e-7)
-    np.testing.assert_allclose(rows["speed"][0][:, 0], np.sum(rate**2, axis=1))
+    np.testing.assert_allclose(used["torque"][:, 0], torque, atol=1e-13)
+    np.testing.assert_allclose(used["force"][..., 0], force, atol=1e-7)
+    np.testing.assert_allclose(used["speed"][:, 0, 0], np.sum(rate**2, axis=1))
     size = np.linalg.norm(bend, axis=1)
-    np.testing.assert_allclose(np.linalg.norm(rows["acceleration"][0], axis=1), size, atol=1e-7)
+    np.testing.assert_allclose(np.linalg.norm(used["acceleration"][:, 0], axis=1), size, atol=1e-7)
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -301,17 +302,17 @@ def test_a_recording_needs_little_memory():
     tracemalloc.stop()
     assert peak < 2000 * 20e3
     assert len(timed.s) < 6 * 2000
-    with mock.patch.object(timing, "_check_memory", wraps=timing._check_memory) as checked:
+    with mock.patch.object(_cells, "_check_memory", wraps=_cells._check_memory) as checked:
         rb.fastest(path, acceleration=1, angular_acceleration=1)
     assert checked.call_args.args[0] == pytest.approx(4 * 2000, rel=0.1)
     with pytest.raises(MemoryError, match="divide the path"):
-        timing._check_memory(10**13)
+        _cells._check_memory(10**13)
 
 
 def test_a_long_calculation_shows_its_progress(capsys, monkeypatch):
     clock = iter(range(0, 10**6, 7))
-    monkeypatch.setattr(timing.reported.__globals__["time"], "monotonic", lambda: next(clock))
-    list(timing.reported("work", range(3)))
+    monkeypatch.setattr(_cells.reported.__globals__["time"], "monotonic", lambda: next(clock))
+    list(_cells.reported("work", range(3)))
     assert capsys.readouterr().err == "work: 33%\nwork: 67%\n"
 
 
@@ -450,7 +451,7 @@ def test_an_unknown_limit_is_refused():
 
 
 def test_a_limit_that_is_exceeded_between_the_points_gives_a_warning(monkeypatch):
-    monkeypatch.setattr(timing, "REFINEMENTS", 0)
+    monkeypatch.setattr(_cells, "REFINEMENTS", 0)
     c = random_chain(0)
     steps = np.diff(c.times) * [1, 1e-3, *np.ones(len(c.times) - 3)]  # the path runs off and back
     uneven = rb.chain(np.append(0, np.cumsum(steps)), c(c.times))
