@@ -127,7 +127,8 @@ class Body:
 
     def moved(self, R: Array, d: Array) -> Body:
         """Return the same body in a body frame that is turned by R and moved by d."""
-        return self._with(R.T @ self.inertia @ R, R.T @ (self.centre - d))
+        G = R.T @ self.inertia @ R
+        return self._with((G + G.mT) / 2, R.T @ (self.centre - d))
 
     def _with(self, inertia: Array, centre: Array) -> Body:
         body = object.__new__(Body)

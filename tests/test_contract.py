@@ -1,10 +1,16 @@
-"""Test that all functions that make curves keep the contract, and that its checks detect faults."""
+"""Test that all functions that make curves keep the contract, and that its checks detect faults.
+
+The functions, their options and their groups come from the package: a function of `rbcourse` or of
+`closed_forms` that has the parameters `start` and `goal` is tested here without an edit.
+"""
 
 import inspect
+import itertools
 import math
 import pickle
 import typing
 from copy import copy
+from dataclasses import fields, replace
 from functools import cache, partial
 
 import numpy as np
@@ -13,17 +19,18 @@ import pytest
 
 import rbcourse as rb
 
-
-def of(function, *more):
-    """Return a function that calls `function` with its required ends and those in `more`."""
-    parameters = inspect.signature(function).parameters.values()
-
-    def make(ends, **given):
-        return function(**{name: ends[name] for name in make.names}, **given)
-
-    make.names = [*(p.name for p in parameters if p.default is p.empty), *more]
-    make.function = function
-    return make
+FUNCTIONS = rb.closed_forms.FORMS | {
+    name: function
+    for module in (rb, rb.closed_forms)
+    for name in module.__all__
+    if inspect.isfunction(function := getattr(module, name))
+    and {"start", "goal"} <= set(inspect.signature(function).parameters)
+}
+REFUSED = {"screw": 3, "minimum_torque": 4, "minimum_jerk": 4}
+"""The size of the matrices that these functions refuse; all others take rotations and poses."""
+ORDERS = {"start": 0, "goal": 0, "v0": 1, "v1": 1, "a0": 2, "a1": 2}
+"""The arguments that state the ends of a curve, and the orders of their derivatives."""
+CENTRE, MASS = np.array([0.1, -0.2, 0.3]), 1.3
 
 
 def uneven(c, t, order):
@@ -31,60 +38,100 @@ def uneven(c, t, order):
     return (t + c * t * (1 - t), 1 + c * (1 - 2 * t), -2 * c + 0 * t, 0 * c * t)[order]
 
 
-def timed(R0, R1):
-    c = np.trace(np.swapaxes(R0, -1, -2) @ R1, axis1=-2, axis2=-1)
-    return rb.projected_line(R0, R1, partial(uneven, c))
-
-
-def returns_a_curve(function):
-    kind = typing.get_type_hints(function)["return"]
-    return inspect.isclass(kind) and issubclass(kind, rb.Curve)
-
-
-FUNCTIONS = rb.closed_forms.FORMS | {
-    name: function
-    for name in rb.__all__
-    if inspect.isfunction(function := getattr(rb, name)) and returns_a_curve(function)
-}
-NO_STACKS = {  # tested in test_paths.py, test_splines.py and test_timing.py
-    name
-    for name, function in FUNCTIONS.items()
-    if issubclass(typing.get_type_hints(function)["return"], rb.Chain | rb.Timed)
-}
-bezier, cubic = rb.closed_forms.bezier, rb.projected_cubic
-MAKERS = {
-    **{name: of(function) for name, function in FUNCTIONS.items() if name not in NO_STACKS},
-    "retime": of(lambda R0, R1: rb.retime(rb.geodesic(R0, R1), 2.5)),
-    "stationary_so3": of(lambda R0, R1, w0, w1: rb.optimum.stationary(bezier(R0, R1, w0, w1))),
-    "minimum_acceleration of a body": of(rb.minimum_acceleration, "inertia"),
-    "minimum_acceleration of a body": of(rb.minimum_acceleration, "inertia"),
-    "minimum_acceleration off centre": of(
-        partial(rb.minimum_acceleration, centre=[0.1, -0.2, 0.3])
+OPTIONS = {
+    "body": lambda ends: rb.Body(ends["inertia"], MASS, CENTRE),
+    "long": lambda ends: True,
+    "f": lambda ends: partial(
+        uneven, np.vecdot(ends["start"][..., :3, :3], ends["goal"][..., :3, :3]).sum(axis=-1)
     ),
-    "projected_line with f": of(timed),
-    "retime of a projection": of(lambda R0, R1, w0, w1: rb.retime(cubic(R0, R1, w0, w1), 0.5)),
 }
-CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # each order has its core shape
-RATES = {"w0": 1, "w1": 1, "d0_dot": 1, "d1_dot": 1, "a0": 2, "a1": 2}
+"""Arguments that are tested if a function has them; if they have a default, also without them."""
 
 
-def sample(*batch, seed=0, size=1):
+class Maker:
+    """A function that makes curves of one group, with some of its options."""
+
+    def __init__(self, function, size, *options):
+        self.function, self.size, self.options = function, size, options
+        self.parameters = inspect.signature(function).parameters
+        self.names = [name for name in ORDERS if name in self.parameters]
+
+    def __call__(self, ends, **given):
+        chosen = {name: OPTIONS[name](ends) for name in self.options}
+        return self.function(*(ends[name] for name in self.names), **chosen | given)
+
+
+def makers():
+    """Return a dict of all functions, with each option, for both groups."""
+    found = {}
+    for name, function in FUNCTIONS.items():
+        has = inspect.signature(function).parameters
+        needed = [
+            option
+            for option in OPTIONS
+            if option in has and has[option].default is has[option].empty
+        ]
+        for option in [None, *(option for option in OPTIONS if option in has)]:
+            options = {*needed, option} - {None}
+            for size in {3, 4} - {REFUSED.get(name)}:
+                found["-".join([name, *options, str(size)])] = Maker(function, size, *options)
+    return found
+
+
+def sample(*batch, seed=0, size=1, group=3):
     """Return ends of all kinds: turns of up to 2 rad and moderate rates, both scaled by `size`."""
     rng = np.random.default_rng([104, seed])
     R0, Q = rb.sample_rotation((2, *batch), rng=rng)
     R1 = R0 @ rb.exp_so3(size * rng.uniform(-1.15, 1.15, (*batch, 3)))
-    w0, w1, a0, a1, d0, d1, v0, v1 = size * rng.uniform(-1, 1, (8, *batch, 3))
+    rates = size * rng.uniform(-1, 1, (4, *batch, 6))
+    d0, d1 = size * rng.uniform(-1, 1, (2, *batch, 3))
     G = Q @ (rng.uniform(1, 1.9, (*batch, 3, 1)) * Q.mT)
-    A0, A1 = rb.pose_from_components(R0, d0), rb.pose_from_components(R1, d1)
-    names = ["R0", "R1", "w0", "w1", "a0", "a1", "inertia", "A0", "A1", "d0_dot", "d1_dot"]
-    values = R0, R1, w0, w1, a0, a1, (G + G.mT) / 2, A0, A1, v0, v1
-    return dict(zip(names, values, strict=True))
+    ends = [R0, R1, *rates[..., :3]]
+    if group == 4:
+        ends = [rb.pose_from_components(R0, d0), rb.pose_from_components(R1, d1), *rates]
+    return dict(zip(ORDERS, ends, strict=True)) | {"inertia": (G + G.mT) / 2}
+
+
+def part(ends, index):
+    return {name: value[index] for name, value in ends.items()}
+
+
+def frame(group, seed, *, shifted=True):
+    """Return a frame, and the matrix that takes velocities in it to those in the old frame."""
+    A = sample(seed=seed, group=4)["start"]
+    A[:3, 3] *= shifted
+    return (A, rb.adjoint_se3(A)) if group == 4 else (A[:3, :3], A[:3, :3])
+
+
+def moved(make, start, goal, v0, v1):
+    """Return the curve with these ends as a curve that is moved; its body is not a ball."""
+    group = start.shape[-1]
+    (L, _), (X, old) = frame(group, 5), frame(group, 6)
+    start, goal = (np.linalg.inv(L) @ A @ np.linalg.inv(X) for A in (start, goal))
+    body = rb.Body(np.diag([1.0, 1.2, 1.5]), MASS, CENTRE)
+    return make(start, goal, v0 @ old.T, v1 @ old.T, body=body).moved(L, X)
+
+
+bezier, cubic, optimum = rb.closed_forms.bezier, rb.projected_cubic, rb.minimum_acceleration
+DERIVED = {
+    "retimed": lambda start, goal: rb.geodesic(start, goal).retimed(2.5),
+    "retimed cubic": lambda start, goal, v0, v1: cubic(start, goal, v0 / 2, v1 / 2).retimed(0.5),
+    "moved": lambda start, goal, v0, v1: moved(cubic, start, goal, v0, v1),
+    "moved optimum": lambda start, goal, v0, v1: moved(optimum, start, goal, v0, v1),
+}
+MAKERS = makers() | {
+    f"{name}-{size}": Maker(function, size) for name, function in DERIVED.items() for size in (3, 4)
+}
+MAKERS["stationary-3"] = Maker(
+    lambda start, goal, v0, v1: rb.optimum.stationary(bezier(start, goal, v0, v1)), 3
+)
+CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # each order has its core shape
 
 
 @cache
 def made(make, *batch):
     """Return the curve with the ends of `sample`; each curve is made once."""
-    return make(sample(*batch))
+    return make(sample(*batch, group=make.size))
 
 
 def times(curve, *shape):
@@ -113,24 +160,18 @@ def off(a, b):
 
 def meets_its_ends(make):
     """Check that the curve has the given rotations or poses, velocities and accelerations."""
-    ends, curve = sample(2, 3), made(make, 2, 3)
-    for k, t in enumerate(curve.domain):
-        value = ends[f"{'RA'[curve.size - 3]}{k}"]
-        assert off(curve(t), value) < 1e-13
-        for order, name in ((1, f"w{k}"), (2, f"a{k}")):
-            if name in make.names and make is not MAKERS["retime of a projection"]:
-                assert off(curve(t, order)[..., :3], ends[name]) < 1e-11
-        if f"d{k}_dot" in make.names:
-            moved = (value[..., :3, :3] @ curve(t, 1)[..., 3:, None])[..., 0]
-            assert off(moved, ends[f"d{k}_dot"]) < 1e-12
+    ends, curve = sample(2, 3, group=make.size), made(make, 2, 3)
+    for name in make.names:
+        t = curve.domain[name in ("goal", "v1", "a1")]
+        order = ORDERS[name]
+        assert off(curve(t, order), ends[name]) < (1e-11 if order else 1e-13)
 
 
 def has_the_derivatives_of_its_values(make):
     """Check R' = R ŵ, w' and w''; on SE(3) also Rᵀ d' and Rᵀ d'', as defined in `Curve`. Small
     motions are tested, too."""
-    long = make.function in (rb.exponential_cubic_long_so3, rb.bezier_long_so3)
-    sizes = np.array([1, 1, 1] if long else [1, 1e-3, 1e-7])
-    curve = make(sample(3, size=sizes[:, None]))
+    sizes = np.array([1, 1, 1] if "long" in make.options else [1, 1e-3, 1e-7])
+    curve = make(sample(3, size=sizes[:, None], group=make.size))
     start, end = curve.domain
     t = start + (end - start) * np.array([0.1, 0.37, 0.8])
 
@@ -152,19 +193,36 @@ def has_the_derivatives_of_its_values(make):
 
 def is_the_stack_of_its_members(make):
     """Check that every member of a stack equals the single curve, and that ends broadcast."""
-    ends, stack = sample(2, 3), made(make, 2, 3)
+    ends, stack = sample(2, 3, group=make.size), made(make, 2, 3)
     t = times(stack, 5)
     values = jet(stack, t)
     assert stack.batch_shape == (2, 3)
     for i in np.ndindex(2, 3):
-        one = make({name: value[i] for name, value in ends.items()})
+        one = make(part(ends, i))
         want = jet(one, t)
         assert one.batch_shape == ()
         assert off(values[:, *i], want) < 1e-11
         assert off(jet(stack[i], t), want) < 1e-11
-    first = {name: value[0] if name[1] == "0" else value for name, value in sample(2).items()}
-    last = {name: value if name[1] == "0" else value[1] for name, value in first.items()}
+    ends, starts = sample(2, group=make.size), ("start", "v0", "a0")
+    first = {name: value[0] if name in starts else value for name, value in ends.items()}
+    last = {name: value if name in starts else value[1] for name, value in first.items()}
     assert off(make(first)(t)[:, 1], make(last)(t)) < 1e-11
+
+
+def is_the_same_at_one_time_and_in_one_pass(make):
+    """Check `state`, and single times of a single curve, for which there is a separate path."""
+    stack = made(make, 2)
+    t = np.append(times(stack, 3), stack.domain)
+    for curve in (stack, stack[1]):
+        values = [curve(t, order) for order in range(len(CORES[make.size]))]
+        state = curve.state(t)
+        found = state.pose, state.velocity, state.acceleration
+        assert all(map(np.array_equal, found, values))
+        for i, time in enumerate(t):
+            for order, want in enumerate(values):
+                assert off(curve(time, order), want[i]) < 1e-13
+            for one, want in zip(curve.state(time), values, strict=False):
+                assert off(one, want[i]) < 1e-13
 
 
 def has_values_at_times_of_any_shape(make):
@@ -172,9 +230,9 @@ def has_values_at_times_of_any_shape(make):
     for batch in ((), (2,), (0,), (2, 0)):
         curve = made(make, *batch)
         assert jet(curve, times(curve, 0)).size == 0
-        for shape in ((), (2, 3)):
-            t = times(curve, *shape)
-            assert np.array_equal(jet(curve, t).ravel(), jet(curve, t.ravel()).ravel())
+        t = times(curve, 2, 3)
+        assert np.array_equal(jet(curve, t).ravel(), jet(curve, t.ravel()).ravel())
+        assert off(jet(curve, t[0, 0]), jet(curve, t[0, :1])[0]) < 1e-13
     curve = made(make, 2)
     t = times(curve, 2600)  # for two curves, these times fill more than one block
     values = jet(curve, t)
@@ -211,31 +269,50 @@ def is_indexed_as_an_array_is(make):
         assert some.batch_shape == numbers[index].shape
         assert off(jet(some, t), values.reshape(3, 6, -1)[:, numbers[index]]) < 1e-12
         for name in told:
-            assert off(getattr(some, name), np.asarray(getattr(stack, name))[index]) < 1e-12
+            want = np.asarray(getattr(stack, name))[index]
+            np.testing.assert_allclose(getattr(some, name), want, rtol=1e-12, atol=1e-12)
     assert [one.batch_shape for one in stack] == [(3,), (3,)]
+    assert (len(stack), len(stack[0, :0])) == (2, 0)
+    assert all([stack[0, 0], stack[:0]])
     with pytest.raises(IndexError):
         stack[2]
-    with pytest.raises(TypeError, match="a single curve"):
-        stack[0, 0][0]
+    for call in (len, lambda one: one[0]):
+        with pytest.raises(TypeError, match="a single curve"):
+            call(stack[0, 0])
 
 
 def keeps_and_changes_no_arguments(make):
     """Check that ends, times and returned arrays are independent of the curve."""
-    ends, before = sample(2), sample(2)
-    curve = make(ends)
-    t, asked = times(curve, 3), times(curve, 3)
-    values = [curve(t, order) for order in range(len(CORES[curve.size]))]
-    assert all(np.array_equal(ends[name], before[name]) for name in ends)
-    assert np.array_equal(t, asked)
-    first = [value.copy() for value in values]
-    for value in (*ends.values(), *values):
-        value.fill(np.nan)
-    assert all(np.array_equal(curve(t, order), value) for order, value in enumerate(first))
+    for batch in ((2,), ()):
+        ends, before = (sample(*batch, group=make.size) for _ in range(2))
+        curve = make(ends)
+        t = asked = times(curve, *[3][: len(batch)])
+        t = t.copy()
+        values = [curve(t, order) for order in range(len(CORES[curve.size]))]
+        assert all(np.array_equal(ends[name], before[name]) for name in ends)
+        assert np.array_equal(t, asked)
+        first = [value.copy() for value in values]
+        for value in (*ends.values(), *values):
+            value.fill(np.nan)
+        assert all(np.array_equal(curve(t, order), value) for order, value in enumerate(first))
+
+
+def has_arrays_that_cannot_be_changed(make):
+    curve = made(make, 2)
+    with pytest.raises(AttributeError):
+        curve.duration = 2
+    for name in [field.name for field in fields(curve)] + ["margin", "certified", "body"]:
+        value = getattr(curve, name, None)
+        for array in (value, getattr(value, "inertia", None)):
+            if isinstance(array, np.ndarray) and array.flags.writeable:
+                array[...] = 7
+                assert np.all(getattr(curve, name) != 7)
 
 
 def refuses_bad_arguments_by_name(make):
     for name in make.names:
-        good, bad = sample(2)[name], []
+        ends = sample(2, group=make.size)
+        good, bad = ends[name], []
         for kind, entry in ((float, np.nan), (complex, 1j), (object, "a")):
             bad.append(good.astype(kind))
             bad[-1][(1,) + (0,) * (good.ndim - 1)] = entry
@@ -243,10 +320,9 @@ def refuses_bad_arguments_by_name(make):
         bad += [[[[1.0, 0, 0], [0, 1]]], np.ma.masked_less(good, 0)]
         for one in bad:
             with pytest.raises(ValueError, match=rf"^{name}"):
-                make(sample(2) | {name: one})
-        if len(make.names) > 1:
-            with pytest.raises(ValueError, match=name):
-                make(sample(2) | {name: sample(3)[name]})
+                make(ends | {name: one})
+        with pytest.raises(ValueError, match=name):
+            make(ends | {name: sample(3, group=make.size)[name]})
 
 
 def refuses_bad_times_and_orders(make):
@@ -266,38 +342,63 @@ def is_the_same_after_pickling(make):
     t = times(curve, 3)
     assert np.array_equal(jet(again, t), jet(curve, t))
     assert repr(again) == repr(curve)
+    assert repr(again.body) == repr(curve.body)
+    assert np.array_equal(again.body.inertia, curve.body.inertia)
     assert f"on S{'OE'[curve.size - 3]}({curve.size - (curve.size == 4)})" in repr(curve)
 
 
 def moves_with_its_ends(make):
-    """Check that the ends L A0 and L A1 give the curve L A(t). On SO(3), check also that the ends L
-    R0 Q and L R1 Q, with the inertia turned by Q, give L R(t) Q."""
-    ends, curve = sample(2), made(make, 2)
-    L, Q = sample(seed=1), sample(seed=2)["R0"]
+    """Check that the ends L A0 X and L A1 X give the curve L A(t) X, which `moved` returns.
+
+    For a body, X is any frame; for other functions, it is a rotation.
+    """
+    ends, curve = sample(2, group=make.size), made(make, 2)
+    (L, _), (X, old) = frame(make.size, 1), frame(make.size, 2, shifted="body" in make.options)
+    if make.function in DERIVED.values():
+        X, old = np.eye(len(X)), np.eye(len(old))
+    given = {name: ends[name] @ np.linalg.inv(old).T for name in make.names[2:]}
+    given |= {name: L @ ends[name] @ X for name in ("start", "goal")}
+    body = OPTIONS["body"](ends).moved(X[:3, :3], X[:3, 3] if make.size == 4 else np.zeros(3))
+    same = make(ends | given, **{"body": body} if "body" in make.options else {})
     t = times(curve, 3)
-    if curve.size == 3:
-        moved = {name: ends[name] @ Q for name in make.names}
-        moved |= {name: L["R0"] @ moved[name] for name in ("R0", "R1")}
-        if "inertia" in moved:
-            moved["inertia"] = Q.T @ moved["inertia"]
-        want = L["R0"] @ curve(t) @ Q, curve(t, 1) @ Q
-    else:
-        moved = ends | {name: L["A0"] @ ends[name] for name in ("A0", "A1")}
-        moved |= {name: ends[name] @ L["R0"].T for name in ("d0_dot", "d1_dot")}
-        want = L["A0"] @ curve(t), curve(t, 1)
-    same = make(moved)
-    assert off(same(t), want[0]) < 1e-10
-    assert off(same(t, 1), want[1]) < 1e-9
+    assert off(same(t), L @ curve(t) @ X) < 1e-10
+    assert off(same(t, 1), curve(t, 1) @ np.linalg.inv(old).T) < 1e-9
+    assert off(jet(curve.moved(L, X), t), jet(same, t)) < 1e-9
+
+
+def costs_the_same_if_it_is_moved(make):
+    """The new body frame has another origin, so that the centre of the body is elsewhere in it."""
+    curve = made(make, 2)
+    other = curve.moved(*(frame(make.size, seed)[0] for seed in (1, 2)))
+    cost = rb.acceleration_cost(curve, rtol=1e-8)
+    assert rb.acceleration_cost(other, rtol=1e-8) == pytest.approx(cost, rel=1e-7, abs=1e-18)
+
+
+def knows_its_body(make):
+    """Members of a stack, slower curves and moved curves keep the body."""
+    stack = made(make, 2)
+    given = sample(2)["inertia"]
+    if make.function not in DERIVED.values():
+        want = OPTIONS["body"]({"inertia": given}) if "body" in make.options else rb.Body.ball()
+        assert np.array_equal(stack.body.inertia, want.inertia)
+        assert np.array_equal([stack.body.mass, *stack.body.centre], [want.mass, *want.centre])
+    inertias = np.broadcast_to(stack.body.inertia, (2, 3, 3))
+    for i, one in enumerate(stack):
+        for other in (one, one.retimed(3), one.moved()):
+            assert np.array_equal(other.body.inertia, inertias[i])
+            assert np.array_equal(other.body.centre, stack.body.centre)
+            assert other.body.mass == stack.body.mass
 
 
 def lasts_as_long_as_it_is_told(make):
     """Multiply the rates by T, make the curve on [0, 1], and retime it. The result must equal the
     curve of duration T."""
-    if "duration" not in inspect.signature(make.function).parameters:
+    if "duration" not in make.parameters:
         return  # a curve without the parameter `duration` keeps its own duration
-    ends, T = sample(3), np.array([0.5, 1, 1.5])
+    ends, T = sample(3, group=make.size), np.array([0.5, 1, 1.5])
     curve = make(ends, duration=T)
-    unit = make(ends | {name: ends[name] * T[:, None] ** power for name, power in RATES.items()})
+    slow = {name: ends[name] * T[:, None] ** ORDERS[name] for name in make.names[2:]}
+    unit = make(ends | slow)
     assert np.array_equal(curve.duration, T)
     assert off(getattr(curve, "margin_time", 0), getattr(unit, "margin_time", 0) * T) < 1e-6
     assert curve.domain == (0, 0.5)
@@ -315,15 +416,21 @@ def lasts_as_long_as_it_is_told(make):
 def altered(name, change):
     """Return a function that makes projected cubics with a method replaced by `change`."""
 
-    def make(R0, R1, w0, w1):
-        curve = copy(cubic(R0, R1, w0, w1))
+    def make(start, goal, v0, v1):
+        ends = start, goal, v0, v1
+        curve = copy(cubic(*ends))
         right = getattr(curve.__class__, name)
         changed = {name: lambda self, *given: change(right, self, *given)}
         object.__setattr__(curve, "__class__", type("Altered", (curve.__class__,), changed))
-        curve.__dict__.update(given=(R0, R1, w0, w1), known={})
+        curve.__dict__.update(given=ends, known={})
         return curve
 
     return make
+
+
+def with_arrays_that_can_be_changed(curve):
+    object.__setattr__(curve, "ends", curve.ends.copy())
+    return curve
 
 
 def scaled(order, by):
@@ -334,9 +441,9 @@ def scaled(order, by):
 # clause must detect.
 CONTRACT = {
     meets_its_ends: {
-        "end": lambda R0, R1, w0, w1: bezier(R0, R1 @ rb.exp_so3([0, 0, 1e-9]), w0, w1),
-        "end velocity": lambda R0, R1, w0, w1: bezier(R0, R1, w0, 1.0000001 * w1),
-        "velocities exchanged": lambda R0, R1, w0, w1: bezier(R0, R1, w1, w0),
+        "end": lambda start, goal, v0, v1: bezier(start, goal @ rb.exp_so3([0, 0, 1e-9]), v0, v1),
+        "end velocity": lambda start, goal, v0, v1: bezier(start, goal, v0, 1.0000001 * v1),
+        "velocities exchanged": lambda start, goal, v0, v1: bezier(start, goal, v1, v0),
     },
     has_the_derivatives_of_its_values: {
         "velocity": scaled(1, 1.00001),
@@ -344,7 +451,9 @@ CONTRACT = {
         "jerk": scaled(3, 1.001),
     },
     is_the_stack_of_its_members: {
-        "wrong member": lambda R0, R1, w0, w1: bezier(R0, np.flip(R1, range(R1.ndim - 2)), w0, w1),
+        "wrong member": lambda start, goal, v0, v1: bezier(
+            start, np.flip(goal, range(goal.ndim - 2)), v0, v1
+        ),
     },
     has_values_at_times_of_any_shape: {
         "wrong shape": altered("__call__", lambda call, c, t, k=0: call(c, np.ravel(t), k)),
@@ -355,15 +464,28 @@ CONTRACT = {
     is_indexed_as_an_array_is: {
         "wrong member": altered("__getitem__", lambda get, c, i: get(c, i if i != 0 else 1)),
     },
+    is_the_same_at_one_time_and_in_one_pass: {
+        "state": altered("state", lambda state, c, t: state(c, t)._replace(velocity=c(t, 2))),
+        "single time": altered(
+            "_once", lambda once, c, *given: [1.00001 * x for x in once(c, *given)]
+        ),
+    },
     keeps_and_changes_no_arguments: {
-        "argument changed": lambda R0, R1, w0, w1: bezier(R0, R1, np.add(w0, 1e-9, out=w0), w1),
+        "argument changed": lambda start, goal, v0, v1: bezier(
+            start, goal, np.add(v0, 1e-9, out=v0), v1
+        ),
         "argument kept": altered("__call__", lambda call, c, *given: cubic(*c.given)(*given)),
         "result kept": altered(
             "__call__", lambda call, c, t, k=0: c.known.setdefault(k, call(c, t, k))
         ),
     },
+    has_arrays_that_cannot_be_changed: {
+        "array": lambda start, goal, v0, v1: with_arrays_that_can_be_changed(
+            cubic(start, goal, v0, v1)
+        ),
+    },
     refuses_bad_arguments_by_name: {
-        "unchecked": lambda R0, R1, w0, w1: bezier(R0, R1, np.nan_to_num(w0), w1),
+        "unchecked": lambda start, goal, v0, v1: bezier(start, goal, np.nan_to_num(v0), v1),
     },
     refuses_bad_times_and_orders: {
         "unchecked": altered("__call__", lambda call, c, t, k=0: call(c, np.clip(t, 0, 1), k)),
@@ -372,13 +494,28 @@ CONTRACT = {
         "other curve": altered("__reduce__", lambda _, c: (cubic, (*c.given[:3], c.given[2]))),
     },
     moves_with_its_ends: {
-        "body's axes": lambda R0, R1, w0, w1: cubic(R0, R1, w0, w1 * [1, 1, 1.0001]),
-        "room's axes": lambda R0, R1, w0, w1: cubic(R0, R1, w0, w1 + 1e-6 * R0[..., 0, :]),
+        "body's axes": lambda start, goal, v0, v1: cubic(start, goal, v0, v1 * [1, 1, 1.0001]),
+        "room's axes": lambda start, goal, v0, v1: cubic(
+            start, goal, v0, v1 + 1e-6 * start[..., 0, :]
+        ),
+    },
+    costs_the_same_if_it_is_moved: {
+        "centre": altered(
+            "_moved", lambda move, c, L, X: replace(move(c, L, X), body=rb.Body(np.diag([1, 2, 3])))
+        ),
+    },
+    knows_its_body: {
+        "body": lambda start, goal, v0, v1: replace(
+            cubic(start, goal, v0, v1), body=rb.Body(np.eye(3))
+        ),
+        "member's body": altered(
+            "retimed", lambda retime, c, T: replace(retime(c, T), body=rb.Body(np.eye(3)))
+        ),
     },
     lasts_as_long_as_it_is_told: {
-        "unit of time": lambda R0, R1, w0, w1, *, duration=1.0: rb.retime(
-            bezier(R0, R1, w0, w1), duration
-        ),
+        "unit of time": lambda start, goal, v0, v1, *, duration=1.0: bezier(
+            start, goal, v0, v1
+        ).retimed(duration),
     },
 }
 
@@ -386,17 +523,58 @@ CONTRACT = {
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 @pytest.mark.parametrize("clause", CONTRACT)
 def test_a_curve_keeps_the_contract(make, clause):
-    if clause is not refuses_bad_arguments_by_name or make.function in FUNCTIONS.values():
+    checked = make.function in FUNCTIONS.values() and "f" not in make.options
+    if checked or clause is not refuses_bad_arguments_by_name:
         clause(make)
 
 
 def test_every_function_that_returns_a_curve_is_tested():
-    assert set(FUNCTIONS) <= set(MAKERS) | NO_STACKS
-    assert len(FUNCTIONS) >= 20
+    """Functions of paths and of curves have tests of their own: `test_paths.py` and others."""
+    for module in (rb, rb.closed_forms):
+        for name in set(module.__all__) - set(FUNCTIONS):
+            function = getattr(module, name)
+            kind = inspect.isfunction(function) and typing.get_type_hints(function)["return"]
+            if inspect.isclass(kind) and issubclass(kind, rb.Curve):
+                first = next(iter(inspect.signature(function).parameters))
+                assert first in ("times", "curve", "rotation")
+    assert len(FUNCTIONS) >= 16
+    assert {name.rpartition("-")[0] for name in MAKERS} >= set(FUNCTIONS) - {
+        "normal_cubic",
+        "minimum_torque",
+    }
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_the_other_group_is_refused(name):
+    size = REFUSED[name]
+    with pytest.raises(ValueError, match=f"^start, goal: .*got {['rotations', 'poses'][size - 3]}"):
+        Maker(FUNCTIONS[name], size, *(FUNCTIONS[name] is rb.minimum_torque) * ["body"])(
+            sample(group=size)
+        )
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_errors_name_the_ends_that_do_not_fit_each_other(name):
+    """Every combination of rotations and poses with velocities of both sizes is tried."""
+    size, other = (4, 3) if name == "screw" else (3, 4)
+    make = Maker(FUNCTIONS[name], size, *["body"] * (name in ("normal_cubic", "minimum_torque")))
+    right, wrong = sample(group=size), sample(group=other)
+    for mixed in itertools.product((False, True), repeat=len(make.names)):
+        ends = right | {
+            key: wrong[key] for key, is_wrong in zip(make.names, mixed, strict=True) if is_wrong
+        }
+        if all(mixed) or not any(mixed):
+            continue
+        if mixed[0] != mixed[1]:
+            names = "start, goal"
+        else:
+            names = next(key for key, one in zip(make.names, mixed, strict=True) if one != mixed[0])
+        with pytest.raises(ValueError, match=f"^{names}: .* wanted"):
+            make(ends)
 
 
 @pytest.mark.parametrize("clause", CONTRACT)
 def test_each_fault_is_reported_under_the_clause_that_it_breaks(clause):
     for fault in CONTRACT[clause].values():
         with pytest.raises((AssertionError, ValueError, pytest.fail.Exception)):
-            clause(of(fault))
+            clause(Maker(fault, 3))

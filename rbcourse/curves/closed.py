@@ -414,7 +414,7 @@ class QuaternionCubic(NormalizedCubic):
     @property
     def margin(self) -> Array:
         """The least norm of the cubic."""
-        return self._least[1]
+        return self._least[1].copy()
 
     @property
     def margin_time(self) -> Array:

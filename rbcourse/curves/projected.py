@@ -84,7 +84,7 @@ class ProjectedPolynomial(Curve):
     @property
     def margin(self) -> Array:
         """The minimum over time of the sum of the two smallest eigenvalues of RᵀM."""
-        return self._least_gap[1]
+        return self._least_gap[1].copy()
 
     @property
     def margin_time(self) -> Array:

@@ -83,7 +83,7 @@ class Optimum(Curve):
     @property
     def certified(self) -> Any:
         """Whether the curve is proven to be a strict local minimum of its cost."""
-        return self._told(self.found.positive)
+        return self._told(self.found.positive.copy())
 
     @property
     def c(self) -> Array:
