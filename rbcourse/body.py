@@ -104,6 +104,8 @@ class Body:
         """
         sides, mass = as_finite("sides", sides, 3), as_positive("mass", mass)
         check_all(sides >= 0, "sides", sides, "a length from 0 up")
+        if (rods := np.count_nonzero(sides, axis=-1) < 2).any():
+            raise ValueError(f"{first_index('sides', rods)}: at most one length of 0 is wanted")
         squares = sides**2
         moments = squares[..., [1, 2, 0]] + squares[..., [2, 0, 1]]
         return cls(mass / 12 * moments[..., None] * np.eye(3), mass)
@@ -127,7 +129,7 @@ class Body:
 
     def moved(self, R: Array, d: Array) -> Body:
         """Return the same body in a body frame that is turned by R and moved by d."""
-        G = R.T @ self.inertia @ R
+        G = self.inertia if self.is_ball else R.T @ self.inertia @ R
         return self._with((G + G.mT) / 2, R.T @ (self.centre - d))
 
     def _with(self, inertia: Array, centre: Array) -> Body:
@@ -167,4 +169,4 @@ def weight_of(name: str, G: Array) -> Array:
             f"{first_index(name, refused)} has the principal moments {least:.6g}, {middle:.6g}, "
             f"{largest:.6g}; each must be at most the sum of the other two"
         )
-    return np.trace(G, axis1=-2, axis2=-1)[..., None, None] / 2 * np.eye(3) - G
+    return np.trace(G / 2, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - G

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import rbcourse as rb
 
 EPS = np.finfo(float).eps
-RNG = np.random.default_rng(63)
+RNG, FORMS = np.random.default_rng(63), rb.closed_forms.FORMS.values()
 N = 8
 A0, A1 = (
     rb.pose_from_components(Rotation.random(N, rng=RNG).as_matrix(), 3 * RNG.normal(size=(N, 3)))
@@ -18,15 +18,13 @@ A0, A1 = (
 RATES = RNG.normal(size=(4, N, 3))
 GEODESICS, SCREWS = rb.geodesic(A0, A1), rb.screw(A0, A1)
 TIMES = np.linspace(0, 1, 11)
-BODY = {
-    "inertia": np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]]),
-    "mass": 2.0,
-    "centre": np.array([0.1, -0.2, 0.3]),
-}
+TWISTS = [rb.twist_from_rates(A, *RATES[k::2]) for k, A in enumerate((A0, A1))]
+INERTIA = np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]])
+BODY = rb.Body(INERTIA, mass=2.0, centre=[0.1, -0.2, 0.3])
 
 
-def on_so3(make, *more):
-    return make(A0[:, :3, :3], A1[:, :3, :3], *more)
+def on_so3(make, *more, **options):
+    return make(A0[:, :3, :3], A1[:, :3, :3], *more, **options)
 
 
 def turned(A, v):
@@ -34,41 +32,45 @@ def turned(A, v):
 
 
 @pytest.mark.source("BK 6.3", "BK (1)", "BK (9)", "BK 2.6", "BK (14)")
-@pytest.mark.parametrize("name", ["geodesic", "projected_cubic", "minimum_acceleration"])
-def test_rotation_and_origin_follow_separate_curves(name):
+@pytest.mark.parametrize("make", [rb.geodesic, *FORMS, rb.minimum_acceleration])
+def test_rotation_and_origin_follow_separate_curves(make):
     """The origin moves on a cubic or, for a geodesic, on a line at constant speed."""
-    rates, slopes = (RATES, RATES[2:]) if name != "geodesic" else ((), [(A1 - A0)[:, :3, 3]] * 2)
-    motion = getattr(rb, f"{name}_se3")(A0, A1, *rates)
-    rotation = on_so3(getattr(rb, f"{name}_so3"), *rates[:2])
+    at_rates = make is not rb.geodesic
+    motion = make(A0, A1, *TWISTS[: 2 * at_rates])
+    rotation = on_so3(make, *RATES[: 2 * at_rates])
+    slopes = RATES[2:] if at_rates else [(A1 - A0)[:, :3, 3]] * 2
     path = CubicHermiteSpline([0, 1], [A0[:, :3, 3], A1[:, :3, 3]], slopes)
     A = motion(TIMES)
     assert rb.is_se(A).all()
     assert np.array_equal(A[..., :3, :3], rotation(TIMES))
     assert np.abs(A[..., :3, 3] - path(TIMES)).max() < 40 * EPS
-    assert np.array_equal(getattr(motion, "margin", None), getattr(rotation, "margin", None))
+    assert np.array_equal(motion.margin, rotation.margin)
     for order in (1, 2):
         assert np.array_equal(motion(TIMES, order)[..., :3], rotation(TIMES, order))
         assert np.abs(turned(A, motion(TIMES, order)[..., 3:]) - path(TIMES, order)).max() < 1e-13
-    assert name != "geodesic" or not motion(TIMES, 2).any()
+    assert at_rates or not motion(TIMES, 2).any()
 
 
 @pytest.mark.source("beyond BK 9")
-def test_the_centre_of_mass_of_a_body_follows_a_cubic():
+@pytest.mark.parametrize(
+    "make", [rb.projected_cubic, rb.minimum_acceleration, rb.closed_forms.normal_cubic]
+)
+def test_the_centre_of_mass_of_a_body_follows_a_cubic(make):
     """The twist refers to the body frame, whose origin is not the centre of mass."""
     t, (w0, w1, *v) = np.linspace(0, 1, 21), RATES
-    motion, r = rb.minimum_acceleration(A0, A1, *RATES, **BODY), BODY["centre"]
+    motion, r = make(A0, A1, *TWISTS, body=BODY), BODY.centre
     A = motion(t)
     centre = (A[..., :3, :3] @ r + A[..., :3, 3]).reshape(21, -1)
     fit = np.polynomial.polynomial.polyfit(t, centre, 3)
     assert np.abs(np.polynomial.polynomial.polyval(t, fit).T - centre).max() < 1e-13
-    alone = on_so3(rb.minimum_acceleration, w0, w1, BODY["inertia"])
+    alone = on_so3(make, w0, w1, body=BODY)
     assert np.abs(A[..., :3, :3] - alone(t)).max() < 1e-13
     assert np.abs(A[[0, -1]] - [A0, A1]).max() < 1e-14
     S = motion([0, 1], 1)
     assert np.abs(S[..., :3] - [w0, w1]).max() < 1e-13
     assert np.abs(turned(A[[0, -1]], S[..., 3:]) - v).max() < 1e-13
-    heavy = rb.minimum_acceleration(A0, A1, *RATES, **BODY | {"mass": 7.0})
-    assert np.array_equal(heavy(t), A)
+    heavy = rb.Body(INERTIA, mass=7.0, centre=r)
+    assert np.array_equal(make(A0, A1, *TWISTS, body=heavy)(t), A)
 
 
 @pytest.mark.source("BK 2.6", "errata 15")
