@@ -14,7 +14,8 @@ from rbcourse._hermite import hermite
 from rbcourse.straight_line import theta
 
 I3, I4, REST = np.eye(3), np.eye(4), np.zeros(3)
-BOOK = np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]])
+INERTIA = np.array([[0.2, 0.02, 0], [0.02, 0.3, 0.01], [0, 0.01, 0.4]])
+BOOK = rb.Body(INERTIA)
 
 
 def about_z(angle):
@@ -50,7 +51,7 @@ def test_costs_of_turns_about_one_axis_agree_with_formulas():
 def test_the_parts_of_the_cost_on_se3_agree_with_their_integrals():
     """∫ m ‖d_c''‖² is computed from the positions of the centre, by a Chebyshev series."""
     A1 = rb.pose_from_coordinates([0.5, 0.4, 0.3, 1, 2, 3])
-    curve = rb.projected_cubic(I4, A1, [1, 2, 0], [0, -1, 1], [1, 1, 1], [1, 0, 3])
+    curve = rb.projected_cubic(I4, A1, [1, 2, 0, 1, 1, 1], [0, -1, 1, 1, 0, 3])
     parts = rb.acceleration_cost_parts(curve)
     squares = gauss(lambda t: np.moveaxis(curve(t, 2) ** 2, -1, 0)).reshape(2, 3)
     assert parts == pytest.approx(squares.sum(axis=1) * [2, 1], rel=1e-10)
@@ -59,12 +60,54 @@ def test_the_parts_of_the_cost_on_se3_agree_with_their_integrals():
     m, r = 2.5, np.array([0.1, -0.3, 0.2])
     path = chebyshev.chebinterpolate(lambda x: curve((x + 1) / 2)[:, :3] @ [*r, 1], 60)
     second = chebyshev.chebder(path, 2, scl=2)
-    rotation, translation = rb.acceleration_cost_parts(curve, BOOK, m, r)
+    body = rb.Body(INERTIA, m, r)
+    rotation, translation = rb.acceleration_cost_parts(curve, body=body)
     squares = gauss(lambda t: chebyshev.chebval(2 * t - 1, second) ** 2)
     assert translation == pytest.approx(m * squares.sum(), rel=1e-8)
-    assert rotation == pytest.approx(rb.acceleration_cost(curve.rotation, BOOK), rel=1e-10)
-    assert rb.acceleration_cost(curve, BOOK, m, r) == pytest.approx(rotation + translation)
-    assert rb.acceleration_cost(curve, 2 * I3) == pytest.approx(rb.acceleration_cost(curve))
+    assert rotation == pytest.approx(rb.acceleration_cost(curve.rotation, body=BOOK), rel=1e-10)
+    assert rb.acceleration_cost(curve, body=body) == pytest.approx(rotation + translation)
+    assert rb.torque_cost(curve, body=body) == rb.torque_cost(curve.rotation, body=BOOK)
+
+
+PROBLEM = rb.exp_so3([0.5, 1.2, -0.4]), [1, 2, 0], [0, -1, 1]
+COST = {"acceleration": rb.acceleration_cost, "torque": rb.torque_cost, "jerk": rb.jerk_cost}
+OPTIMAL = {
+    "acceleration": rb.minimum_acceleration,
+    "torque": rb.minimum_torque,
+    "jerk": rb.minimum_jerk,
+}
+
+
+@pytest.mark.parametrize("what", COST)
+@pytest.mark.parametrize("many", [False, True])
+def test_an_optimum_costs_what_it_states_for_its_body(what, many):
+    """The costs take the body of the curve, also if it moves slowly or is a member of a stack."""
+    inertias = np.stack([INERTIA, 3 * INERTIA]) if many else INERTIA
+    body = rb.Body(inertias, 2.5, [0.1, -0.3, 0.2])
+    given = {} if what == "jerk" else {"body": body}
+    curves = [OPTIMAL[what](I3, *PROBLEM, **given)]
+    if what == "acceleration":
+        poses = I4, rb.pose_from_components(PROBLEM[0], [1, 2, 3])
+        curves += [rb.minimum_acceleration(*poses, [1, 2, 0, 1, 1, 1], body=body)]
+    for curve in curves:
+        for one in (curve, curve.retimed(2), *(curve if curve.batch_shape else ())):
+            assert COST[what](one) == pytest.approx(one.cost, rel=1e-9)
+        if given:
+            other = rb.Body(np.diag([1.0, 2, 2.5]))
+            assert np.all(COST[what](curve, body=other) != COST[what](curve))
+            assert COST[what](curve, body=body) == pytest.approx(curve.cost, rel=1e-9)
+
+
+@pytest.mark.parametrize("make", [rb.projected_spline, rb.minimum_acceleration_spline])
+def test_a_spline_knows_its_body(make):
+    """On the optimal spline for poses, cost and translation are those of the body."""
+    A = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0.3, 0.8, 0, 1, 0, 0], [0, 1, 1, 1, 1, 0]])
+    body = rb.Body(INERTIA, 2.5, [0.1, -0.3, 0.2])
+    for spline in (make([0, 1, 3], P, "rest", body=body) for P in (A[:, :3, :3], A)):
+        cost = rb.acceleration_cost(spline, body=body)
+        assert rb.acceleration_cost(spline) == cost
+        assert cost == pytest.approx(getattr(spline, "cost", cost), rel=1e-9)
+        assert rb.acceleration_cost(spline, body=BOOK) != cost or spline.size == 3
 
 
 @pytest.mark.source("BK 2.6")
@@ -210,47 +253,47 @@ def test_an_integral_that_does_not_converge_raises_an_error():
 def test_a_stack_has_one_cost_for_each_curve(make):
     turns = rb.exp_so3(np.linspace(0.5, 2.9, 6).reshape(2, 3, 1) * [0.6, 0, 0.8])
     stack = make(I3, turns, REST, [0, 2, 0])
-    each = BOOK * np.linspace(1, 2, 6).reshape(2, 3, 1, 1)
-    for cost, G in (
-        *product((rb.torque_cost, rb.acceleration_cost), (BOOK, each)),
+    each = INERTIA * np.linspace(1, 2, 6).reshape(2, 3, 1, 1)
+    for cost, body in (
+        *product((rb.torque_cost, rb.acceleration_cost), (BOOK, rb.Body(each))),
         (rb.acceleration_cost, None),
     ):
-        costs = cost(stack, G)
+        costs = cost(stack, body=body)
         for i in np.ndindex(2, 3):
-            one = cost(stack[i], each[i] if G is each else G)
+            one = cost(stack[i], body=rb.Body(each[i]) if body and body is not BOOK else body)
             assert costs[i] == pytest.approx(one, rel=2e-10)
-    assert rb.acceleration_cost(rb.retime(stack[:, :0], 3)).shape == (2, 0)
+    assert rb.acceleration_cost(stack[:, :0].retimed(3)).shape == (2, 0)
     assert np.all(rb.acceleration_cost(stack.retimed(1e120)) == 0)
     for curve, G, message in (
-        (stack[0, 0], each, r"^inertia: a single matrix or a stack of shape \(\)"),
-        (stack[0], [BOOK] * 2, r"do not broadcast: curve \(3,\), inertia \(2,\)"),
+        (stack[0, 0], each, r"^body: a single body or a stack of shape \(\)"),
+        (stack[0], [INERTIA] * 2, r"do not broadcast: curve \(3,\), body \(2,\)"),
     ):
         with pytest.raises(ValueError, match=message):
-            rb.torque_cost(curve, G)
+            rb.torque_cost(curve, body=rb.Body(G))
 
 
 CURVES = rb.closed_forms.FORMS | {
     "geodesic": lambda R0, R1, w0, w1: rb.geodesic(R0, R1),
     "line": lambda R0, R1, w0, w1: rb.projected_line(R0, R1),
     "optimum": rb.minimum_acceleration,
-    "retimed": lambda *ends: rb.retime(rb.closed_forms.cumulative_bezier(*ends), 1.7),
-    "quintics": lambda R0, R1, w0, w1: rb.retime(
-        rb.closed_forms.exponential_quintic(R0, R1, w0, w1, w1, w0), 0.6
-    ),
+    "retimed": lambda *ends: rb.closed_forms.cumulative_bezier(*ends).retimed(1.7),
+    "quintics": lambda R0, R1, w0, w1: rb.closed_forms.exponential_quintic(
+        R0, R1, w0, w1, w1, w0
+    ).retimed(0.6),
 }
 
 
 @pytest.mark.source("beyond BK 1", "beyond BK 4", "beyond BK 5")
 @pytest.mark.parametrize("name", CURVES)
 def test_costs_agree_with_the_integrals_that_define_them(name):
-    curve = CURVES[name](I3, rb.exp_so3([0.5, 1.2, -0.4]), [1, 2, 0], [0, -1, 1])
+    curve = CURVES[name](I3, *PROBLEM)
 
     def densities(t):
         rates = [curve(t, order) for order in (1, 2, 3)]
-        return np.stack([squared(deviation(what, BOOK, *rates)) for what in OPTIMA])
+        return np.stack([squared(deviation(what, INERTIA, *rates)) for what in OPTIMA])
 
-    found = rb.acceleration_cost(curve), rb.acceleration_cost(curve, BOOK)
-    found += rb.torque_cost(curve, BOOK), rb.jerk_cost(curve)
+    found = rb.acceleration_cost(curve), rb.acceleration_cost(curve, body=BOOK)
+    found += rb.torque_cost(curve, body=BOOK), rb.jerk_cost(curve)
     want = gauss(densities, end=curve.domain[1])
     assert found == pytest.approx(want, rel=1e-10, abs=1e-20)
 
@@ -261,18 +304,17 @@ def test_a_smooth_chain_costs_the_sum_of_its_legs():
     R = rb.exp_so3([[0, 0, 0], [0.3, 0.8, 0], [0, 1.0, 1.0]])
     w, a = np.array([[0, 0, 0], [0.2, 0.5, 0.5], [0, 0, 0]]), [REST, [0.3, -0.2, 0.1], REST]
 
-    def leg(R0, R1, w0, w1, duration):
-        return rb.closed_forms.exponential_quintic(R0, R1, w0, w1, a[:2], a[1:], duration=duration)
-
-    chain = rb.chain([0, 1, 3], R, velocities=w, leg=leg)
-    legs = leg(R[:2], R[1:], w[:2], w[1:], duration=[1, 2])
-    for cost in (rb.jerk_cost, lambda curve: rb.torque_cost(curve, BOOK)):
+    leg = rb.closed_forms.exponential_quintic
+    chain = rb.chain([0, 1, 3], R, w, a, leg=leg)
+    legs = leg(R[:2], R[1:], w[:2], w[1:], a[:2], a[1:], duration=[1, 2])
+    for cost in (rb.jerk_cost, partial(rb.torque_cost, body=BOOK)):
         assert cost(chain) == pytest.approx(cost(legs).sum(), rel=1e-10)
     cubics = rb.chain([0, 1, 3], R, velocities=w, leg=rb.closed_forms.bezier)
     two = rb.closed_forms.bezier(R[:2], R[1:], w[:2], w[1:], duration=[1, 2])
-    assert rb.torque_cost(cubics, BOOK) == pytest.approx(rb.torque_cost(two, BOOK).sum(), rel=1e-9)
+    torques = rb.torque_cost(two, body=BOOK)
+    assert rb.torque_cost(cubics, body=BOOK) == pytest.approx(torques.sum(), rel=1e-9)
     poses = rb.pose_from_components(R, np.array(a) - w)
-    motion = rb.chain([0, 1, 3], poses)
+    motion = rb.projected_spline([0, 1, 3], poses, "rest")
     parts = [sum(x) for x in zip(*map(rb.acceleration_cost_parts, motion.legs), strict=True)]
     assert rb.acceleration_cost_parts(motion) == pytest.approx(parts, rel=1e-9)
     twice = rb.acceleration_cost(motion.retimed(6))
@@ -280,7 +322,7 @@ def test_a_smooth_chain_costs_the_sum_of_its_legs():
     with pytest.raises(RuntimeError, match=r"^jerk cost: an acceleration jumps at a joint, by"):
         rb.jerk_cost(cubics)
     with pytest.raises(RuntimeError, match=r"^torque cost: a velocity jumps at a joint, by"):
-        rb.torque_cost(rb.chain([0, 1, 3], R, leg=rb.geodesic), BOOK)
+        rb.torque_cost(rb.chain([0, 1, 3], R, leg=rb.geodesic), body=BOOK)
 
 
 @pytest.mark.parametrize("unit", [1e-4, 1, 1e4])
@@ -299,10 +341,12 @@ def test_costs_scale_with_the_unit_of_inertia(size):
     G, w0 = size * np.diag([1.0, 2, 2.9]), np.array([0.8, 0.1, 1.2])
     A, w = rb.connection.geodesic_flow(G / size, I3, w0, [0.0, 1.0])
     ends = I3, A[1], w0, w[1]
-    free, other = rb.minimum_torque(*ends, G), rb.closed_forms.bezier(*ends)
+    body, unit = rb.Body(G), rb.Body(G / size)
+    free, other = rb.minimum_torque(*ends, body=body), rb.closed_forms.bezier(*ends)
     for cost, power in ((rb.torque_cost, 2), (rb.acceleration_cost, 1)):
-        assert cost(free, G) < 1e-18 * size**power
-        assert cost(other, G) == pytest.approx(size**power * cost(other, G / size), rel=1e-12)
+        assert cost(free) < 1e-18 * size**power
+        want = size**power * cost(other, body=unit)
+        assert cost(other, body=body) == pytest.approx(want, rel=1e-12)
 
 
 @pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-8, 1e-12])
@@ -311,8 +355,8 @@ def test_a_cost_is_as_accurate_as_rtol_demands(rtol):
     curve = rb.projected_line(I3, rb.exp_so3([[0.3, 1, -0.5], [2, 2, 0.5]]))
     for cost in (
         partial(rb.acceleration_cost, curve),
-        lambda **rtol: rb.acceleration_cost_parts(curve, BOOK, **rtol)[0],
-        partial(rb.torque_cost, curve, BOOK),
+        lambda **rtol: rb.acceleration_cost_parts(curve, body=BOOK, **rtol)[0],
+        partial(rb.torque_cost, curve, body=BOOK),
         partial(rb.jerk_cost, curve),
     ):
         off = np.abs(cost(rtol=rtol) / cost() - 1).max()
@@ -324,13 +368,11 @@ def test_bad_arguments_are_refused():
     line, motion = rb.geodesic(I3, I3), rb.geodesic(I4, I4)
     acceleration, jerk, torque = rb.acceleration_cost, rb.jerk_cost, rb.torque_cost
     for cost, given, message in (
-        (partial(acceleration, mass=0), motion, "^mass is 0.0"),
-        (partial(acceleration, centre=[0, 1]), motion, r"^centre: shape \(3\)"),
-        (partial(acceleration, mass=2.5), line, "^mass, centre: a curve on SO.3. has neither"),
+        (partial(acceleration, body=INERTIA), line, "^body: a Body is wanted, such as Body"),
+        (partial(torque, body=2), motion, "^body: a Body is wanted, such as Body"),
         (acceleration, None, "^curve: a Curve is wanted, got None"),
         (jerk, None, "^curve: a Curve is wanted, got None"),
         (jerk, motion, "^curve: a curve on SO.3. is wanted, got <Rigid"),
-        (partial(torque, inertia=BOOK), motion, "^curve: a curve on SO.3. is wanted, got <Rigid"),
         *((partial(jerk, rtol=x), line, "^rtol") for x in (0, 1e-13, 0.2, np.nan, [1e-6] * 2)),
     ):
         with pytest.raises(ValueError, match=message):
