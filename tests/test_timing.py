@@ -17,12 +17,12 @@ from rbcourse.curves import _cells
 
 I4, REST = np.eye(4), np.zeros(3)
 LEMNISCATE = 2.62205755429212  # B(1/4, 1/2)/2
-BODY = {"inertia": np.diag([0.02, 0.03, 0.04]), "torque": 0.08, "mass": 1.5, "force": 25.0}
+BODY = {"torque": 0.08, "force": 25.0, "gravity": (0, 0, -9.81)}
 NORMS = {"angular_speed": 1.5, "speed": 1, "angular_acceleration": 4, "acceleration": 3}
 SETS = {
     "norms": NORMS,
     "boxes": NORMS | {"angular_acceleration": [4, 3, 5], "acceleration": [3, 4, 2]},
-    "body": BODY | {"gravity": (0, 0, -9.81), "centre": (0.05, 0, 0.1)},
+    "body": BODY | {"body": rb.Body(np.diag([0.02, 0.03, 0.04]), 1.5, [0.05, 0, 0.1])},
     "accelerations": {"angular_acceleration": 4, "acceleration": 3},
 }
 
@@ -33,7 +33,15 @@ def random_chain(seed):
     scale = [0.8, 0.8, 0.8, 0.5, 0.5, 0.5]
     for step in rb.pose_from_coordinates(rng.uniform(-1, 1, (n, 6)) * scale):
         poses.append(poses[-1] @ step)
-    return rb.chain(np.append(0, np.cumsum(rng.uniform(0.5, 1.5, n))), np.array(poses))
+    return spline(np.append(0, np.cumsum(rng.uniform(0.5, 1.5, n))), np.array(poses))
+
+
+def limits_of(given):
+    return {name: limit for name, limit in given.items() if name != "body"}
+
+
+def spline(times, poses, **given):
+    return rb.projected_spline(times, poses, "rest", **given)
 
 
 def moved(*d):
@@ -75,31 +83,31 @@ FORMULAS = {
     "trapezoid": (about(TURN), SPINNING, trapezoid(ANGLE, 1, 2), 3e-7),
     "bang-bang": (about(TURN), {"angular_acceleration": 2}, 2 * np.sqrt(ANGLE / 2), 1e-12),
     "line": (rb.geodesic(I4, LINE), MOVING, 3.5, 2e-6),
-    "line, cubic": (rb.chain([0, 1], [I4, LINE]), MOVING, 3.5, 2e-5),
-    "line, quintic": (
-        rb.chain([0, 1], [I4, LINE], leg=rb.projected_quintic),
-        MOVING,
-        3.5,
-        5e-4,
-    ),
+    "line, cubic": (spline([0, 1], [I4, LINE]), MOVING, 3.5, 2e-5),
+    "line, quintic": (rb.projected_quintic(I4, LINE), MOVING, 3.5, 5e-4),
     "long circle": (circle(3, 0.5), {"acceleration": 2}, on_circle(3, 0.5, 2), 3e-4),
     "short circle": (circle(1.2, 0.5), {"acceleration": 2}, on_circle(1.2, 0.5, 2), 3e-4),
     "tool": (
         rb.geodesic(I4, rb.pose_from_components(rb.exp_so3([0, 0, 3]), REST)),
-        {"acceleration": 2, "centre": (0.3, 0.4, 1)},
+        {"acceleration": 2, "body": rb.Body(G, centre=(0.3, 0.4, 1))},
         on_circle(3, 0.5, 2),
         3e-4,
     ),
     "torque": (
         about(3 * SIDEWAYS),
-        {"torque": 1.5, "inertia": G},
+        {"torque": 1.5, "body": rb.Body(G)},
         on_circle(3 * ACROSS / ALONG, ALONG / ACROSS, 1.5 / ALONG),
         1e-4,
     ),
-    "principal axis": (about([0, 2, 0]), {"torque": 1.5, "inertia": G}, np.sqrt(32 / 3), 1e-12),
+    "principal axis": (
+        about([0, 2, 0]),
+        {"torque": 1.5, "body": rb.Body(G)},
+        np.sqrt(32 / 3),
+        1e-12,
+    ),
     "upwards": (
         rb.geodesic(I4, moved(0, 0, 2)),
-        {"force": 15, "gravity": (0, 0, -9.81)},
+        {"force": 15, "gravity": (0, 0, -9.81), "body": rb.Body(G)},
         2 * np.sqrt(1 / (15 - 9.81) + 1 / (15 + 9.81)),
         1e-9,
     ),
@@ -127,7 +135,7 @@ def test_the_least_time_agrees_with_the_formula(name):
 
 def test_a_turn_with_bounded_torque_has_the_timing_of_the_textbook():
     s, times = textbook.fastest(2.5 * SIDEWAYS, G, 1.5, 1000)
-    timed = rb.fastest(about(2.5 * SIDEWAYS), torque=1.5, inertia=G)
+    timed = rb.fastest(about(2.5 * SIDEWAYS), torque=1.5, body=rb.Body(G))
     np.testing.assert_allclose(timed.s, s, rtol=1e-14)
     np.testing.assert_allclose(timed.times, times, rtol=1e-10)
 
@@ -154,7 +162,9 @@ def test_times_with_box_limits_agree_with_toppra():
     for seed, T in enumerate([2.4639600513, 2.8119294681, 1.8797166882]):
         c, rng = random_chain(seed), np.random.default_rng(seed)
         A0, A1 = c(np.array(c.domain))
-        leg = rb.minimum_acceleration(A0, A1, *rng.uniform(-1, 1, (4, 3)))
+        w0, w1, d0_dot, d1_dot = rng.uniform(-1, 1, (4, 3))
+        v0, v1 = rb.twist_from_rates(A0, w0, d0_dot), rb.twist_from_rates(A1, w1, d1_dot)
+        leg = rb.minimum_acceleration(A0, A1, v0, v1)
         limits = {"angular_speed": 1.5, "speed": 1.0}
         limits |= {"angular_acceleration": [4, 3, 5], "acceleration": [3, 4, 2]}
         assert rb.fastest(leg, **limits).domain[1] == pytest.approx(T, rel=1e-5)
@@ -166,7 +176,7 @@ def test_one_limit_is_reached_at_nearly_all_times(name):
         timed = rb.fastest(random_chain(100 + seed), **SETS[name])
         t = np.linspace(*timed.domain, 100_001)
         V, A, R = (timed(t, order) for order in (1, 2, 0))
-        limits = _cells.as_limits(timed, **SETS[name])
+        limits = _cells.as_limits(timed, SETS[name].get("body"), **limits_of(SETS[name]))
         vectors = [limit.vectors(V, A, R[:, :3, :3]) for limit in limits]
         used = [np.linalg.norm(b + k, axis=-1).max(axis=-1) for _, b, k in vectors]
         used = np.max(used, axis=0)  # these are the squares of the shares of speeds
@@ -189,9 +199,9 @@ def test_shares_of_limits_agree_with_the_torque_and_the_force():
         lambda t: oracles.derivative_by_differences(point, t, 1e-2), t, 1e-2
     )
     force = (R.mT @ (2.0 * (bend - g))[..., None])[..., 0]
-    limits = {"speed": 1, "acceleration": 1, "force": [1, 1, 1], "torque": 1, "inertia": G}
+    limits = {"speed": 1, "acceleration": 1, "force": [1, 1, 1], "torque": 1}
     used = {}
-    for limit in _cells.as_limits(c, **limits, mass=2.0, centre=r, gravity=g):
+    for limit in _cells.as_limits(c, rb.Body(G, 2.0, r), **limits, gravity=g):
         _, b, k = limit.vectors(V, A, R)
         used[limit.name] = b + k
     w = V[:, :3]
@@ -210,25 +220,45 @@ def test_the_least_time_has_the_symmetries_of_the_problem(name):
     c, limits = random_chain(7), SETS[name]
     t, poses, T = c.times, c(c.times), rb.fastest(c, **limits).domain[1]
     turned = rb.pose_from_coordinates([0, 0, 0.8, 3, -2, 1])  # this pose turns about the vertical
-    metres = ("speed", "acceleration", "force", "gravity", "centre")
+    metres, body = ("speed", "acceleration", "force", "gravity"), limits.get("body", rb.Body.ball())
 
     def longer(unit):
         far = poses.copy()
         far[:, :3, 3] *= unit
-        return far, {k: np.multiply(x, unit) if k in metres else x for k, x in limits.items()}
+        other = rb.Body(body.inertia, body.mass, unit * body.centre)
+        theirs = limits_of(limits).items()
+        return far, {k: np.multiply(x, unit) if k in metres else x for k, x in theirs}, other
 
     def faster(k):
-        power = {"centre": 0, "mass": 0, "inertia": 0, "speed": 1, "angular_speed": 1}
-        return {name: np.multiply(x, k ** power.get(name, 2)) for name, x in limits.items()}
+        power, theirs = {"speed": 1, "angular_speed": 1}, limits_of(limits).items()
+        return {name: np.multiply(x, k ** power.get(name, 2)) for name, x in theirs}
 
-    same = [rb.fastest(rb.chain(t, turned @ poses), **limits)]
-    same += [rb.fastest(rb.chain(-t[::-1], poses[::-1]), **limits)]
-    same += [rb.fastest(c.retimed(7.0), **limits)]
+    same = [rb.fastest(spline(t, turned @ poses), **limits)]
+    same += [rb.fastest(spline(-t[::-1], poses[::-1]), **limits)]
+    same += [rb.fastest(c.retimed(7.0), **limits), rb.fastest(c.moved(turned), **limits)]
+    if "body" not in limits:  # norms and components are those of the centre, in the body frame
+        same += [rb.fastest(c.moved(right=moved(1, 2, 3)), **limits)]
     for unit in (1e-4, 1e6):
-        far, theirs = longer(unit)
-        same += [rb.fastest(rb.chain(t, far), **theirs)]
+        far, theirs, other = longer(unit)
+        same += [rb.fastest(spline(t, far), **theirs, body=other)]
     assert [x.domain[1] / T for x in same] == pytest.approx(np.ones(len(same)), rel=1e-12)
-    assert rb.fastest(c, **faster(1.7)).domain[1] * 1.7 == pytest.approx(T, rel=1e-12)
+    quick = rb.fastest(c, body=body, **faster(1.7))
+    assert quick.domain[1] * 1.7 == pytest.approx(T, rel=1e-12)
+
+
+def test_the_body_of_a_curve_is_timed():
+    """Another body frame, such as that of a tool, is no other body, and the motion is the same."""
+    c, limits, X = random_chain(7), dict(SETS["body"]), rb.pose_from_coordinates([1, 2, 3, 1, 2, 3])
+    c = spline(c.times, c(c.times), body=limits.pop("body"))
+    timed, tool = rb.fastest(c, **limits), rb.fastest(c.moved(right=X), **limits)
+    assert timed.domain == rb.fastest(c, body=c.body, **limits).domain
+    assert timed.domain[1] < 0.9 * rb.fastest(c, body=rb.Body(G), **limits).domain[1]
+    assert rb.limits_used(timed, **limits) == rb.limits_used(timed, body=c.body, **limits)
+    assert tool.domain == pytest.approx(timed.domain, rel=1e-9)
+    t = np.linspace(*timed.domain, 9)
+    for order, found in enumerate(timed.moved(right=X).state(t)):
+        np.testing.assert_allclose(found, tool(t * tool.domain[1] / t[-1], order), atol=1e-6)
+    assert np.abs(tool(t[:-1]) - timed(t[:-1]) @ X).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -238,12 +268,12 @@ def test_the_least_time_does_not_depend_on_the_clock(name):
     poses, T = c(c.times), rb.fastest(c, **limits).domain[1]
     for shift, tolerance in ((0, 1e-12), (1e3, 1e-11), (1e6, 1e-9), (1.7e9, 1e-6)):
         for unit in (1, 1e3):
-            later = rb.chain(unit * c.times + shift, poses)
+            later = spline(unit * c.times + shift, poses)
             timed = rb.fastest(later, **limits)
             assert timed.domain[1] == pytest.approx(T, rel=tolerance)
             there = timed.times[np.searchsorted(timed.s, later.times - later.times[0])]
             assert np.abs(timed(there) - poses).max() < 1e-12
-    short = rb.chain(1e-3 * c.times, poses)
+    short = spline(1e-3 * c.times, poses)
     assert rb.fastest(short, **limits).domain[1] == pytest.approx(T, rel=1e-12)
 
 
@@ -251,7 +281,7 @@ def test_shares_of_limits_do_not_depend_on_the_clock():
     c = random_chain(8)
     used = rb.limits_used(c, **NORMS)
     for shift, tolerance in ((1e3, 1e-11), (1e6, 1e-8), (1.7e9, 1e-5)):
-        later = rb.limits_used(rb.chain(c.times + shift, c(c.times)), **NORMS)
+        later = rb.limits_used(spline(c.times + shift, c(c.times)), **NORMS)
         for limit, (share, when) in used.items():
             assert later[limit] == pytest.approx((share, when + shift), rel=tolerance)
 
@@ -272,13 +302,14 @@ def test_a_pause_of_a_recording_takes_no_time(seed):
     times = np.arange(60 + 100) / 200
     paused = np.concatenate([poses[[0] * 30], poses[: stop + 1], poses[[stop] * 20]])
     paused = np.concatenate([paused, poses[stop + 1 :], poses[[-1] * 50]])
-    pausing = rb.chain(times, paused, rest_at="repeated")
-    T = rb.fastest(rb.chain(t, poses, rest_at=[stop]), **NORMS).domain[1]
+    still = np.flatnonzero((paused[1:] == paused[:-1]).all(axis=(1, 2)))
+    pausing = spline(times, paused, rest_at=np.union1d(still, still + 1))
+    T = rb.fastest(spline(t, poses, rest_at=[stop]), **NORMS).domain[1]
     timed = rb.fastest(pausing, **NORMS)
     assert timed.domain[1] == pytest.approx(T, rel=1e-9)
     there = timed.times[np.searchsorted(timed.s, pausing.times)]
     assert np.abs(timed(there) - paused).max() < 1e-12
-    both = [rb.chain(t[part], poses[part]) for part in (slice(stop + 1), slice(stop, None))]
+    both = [spline(t[part], poses[part]) for part in (slice(stop + 1), slice(stop, None))]
     apart = sum(rb.fastest(c, **NORMS).domain[1] for c in both)
     assert apart == pytest.approx(T, rel=5e-3)  # the leg next to a stop has other velocities
 
@@ -287,7 +318,7 @@ def test_the_times_of_legs_between_stops_do_not_matter():
     """After a rest, the motion may continue at another s', because the velocity is 0."""
     poses = rb.pose_from_coordinates(np.random.default_rng(9).uniform(-1, 1, (3, 6)))
     T = [
-        rb.fastest(rb.chain([0, 1, 1 + h], poses, rest_at=[1]), **NORMS).domain[1]
+        rb.fastest(spline([0, 1, 1 + h], poses, rest_at=[1]), **NORMS).domain[1]
         for h in (1, 30, 1e-3)
     ]
     assert T[1:] == pytest.approx([T[0]] * 2, rel=1e-12)
@@ -295,7 +326,7 @@ def test_the_times_of_legs_between_stops_do_not_matter():
 
 def test_a_recording_needs_little_memory():
     t, poses = recording(0, 2000)
-    path = rb.chain(t, poses)
+    path = spline(t, poses)
     tracemalloc.start()
     timed = rb.fastest(path, **NORMS)
     peak = tracemalloc.get_traced_memory()[1]
@@ -343,7 +374,7 @@ def test_many_stops_cost_what_the_formula_says(legs):
 def test_a_timed_curve_has_exact_derivatives(size):
     c = random_chain(5)
     if size == 3:
-        c = rb.chain(c.times, c(c.times)[:, :3, :3])
+        c = spline(c.times, c(c.times)[:, :3, :3])
     limits = {k: NORMS[k] for k in NORMS if size == 4 or k.startswith("angular")}
     timed = rb.fastest(c, **limits)
     there = timed.times[np.searchsorted(timed.s, c.times)]
@@ -374,11 +405,11 @@ def test_the_first_time_at_a_limit_is_returned():
 def test_limits_hold_in_the_cells_next_to_a_rest():
     """In the cells next to a rest, speeds and accelerations are polynomials."""
     line, bent = moved(1, 2, 2), rb.pose_from_coordinates([0.5, 0.3, 1, 1, 0.5, 0.2])
-    slow = rb.fastest(rb.chain([0, 1], [I4, line]), speed=1e-3, acceleration=10)
-    still = rb.chain([0, 1], [I4, bent], leg=rb.projected_quintic)
-    held = rb.fastest(still, force=12, gravity=(0, 0, -9.81), acceleration=3)
+    slow = rb.fastest(spline([0, 1], [I4, line]), speed=1e-3, acceleration=10)
+    still, weight = rb.projected_quintic(I4, bent), {"gravity": (0, 0, -9.81), "body": rb.Body(G)}
+    held = rb.fastest(still, force=12, acceleration=3, **weight)
     further = rb.pose_from_coordinates([0.5, 0.3, 1, 2, 0, 0])
-    still = rb.chain([0, 1], [I4, further], leg=rb.projected_quintic)
+    still = rb.projected_quintic(I4, further)
     free = rb.fastest(still, acceleration=3, angular_acceleration=3)
     for timed, order, most in ((slow, 1, 1e-3), (held, 2, 3), (free, 2, 3)):
         t = np.geomspace(1e-8, 0.5, 100_001) * timed.domain[1]
@@ -398,8 +429,18 @@ UP = rb.geodesic(I4, moved(0, 0, 2))
 REFUSED = [
     (about(TURN), {}, "limits: none of angular_speed, "),
     (about(TURN), {"angular_speed": 1}, "limits: one of angular_acceleration, "),
-    (about(TURN), {"torque": 1}, "inertia: it is required for a limit on the torque"),
-    (about(TURN), {"torque": -1, "inertia": G}, "torque: one or three numbers above 0"),
+    *(
+        (curve, {"torque": 1}, "^body: it is required for a limit on the torque")
+        for curve in (about(TURN), about(TURN).moved(right=rb.exp_so3(TURN)))
+    ),
+    (UP, {"force": 20}, "^body: it is required for a limit on the torque or the force"),
+    (about(TURN), {"torque": 1, "body": G}, "^body: a Body is wanted"),
+    (
+        about(TURN),
+        {"torque": 1, "body": rb.Body([G, G])},
+        r"^body.inertia: shape \(3, 3\) is wanted",
+    ),
+    (about(TURN), {"torque": -1, "body": rb.Body(G)}, "torque: one or three numbers above 0"),
     (
         about(TURN),
         {"angular_acceleration": [1, 2]},
@@ -413,13 +454,13 @@ REFUSED = [
     (about(TURN), {"angular_acceleration": 2, "rates": (0, 5)}, "rates.0. is too low for rates.1."),
     (
         UP,
-        {"force": 9, "gravity": (0, 0, -9.81)},
+        {"force": 9, "gravity": (0, 0, -9.81), "body": rb.Body(G)},
         "force: 1.09 times the limit is needed to hold the body near s = 0",
     ),
     (UP, {"angular_acceleration": 1}, "none of them bounds the speed near s = "),
     (
-        rb.chain([1.7e9, 1.7e9 + 1], [I4, moved(0, 0, 2)]),
-        {"force": 9, "gravity": (0, 0, -9.81)},
+        spline([1.7e9, 1.7e9 + 1], [I4, moved(0, 0, 2)]),
+        {"force": 9, "gravity": (0, 0, -9.81), "body": rb.Body(G)},
         "force: 1.09 times the limit is needed to hold the body near s = 0$",
     ),
     (rb.geodesic(LINE, LINE), MOVING, "curve: the path stands still"),
@@ -454,7 +495,7 @@ def test_a_limit_that_is_exceeded_between_the_points_gives_a_warning(monkeypatch
     monkeypatch.setattr(_cells, "REFINEMENTS", 0)
     c = random_chain(0)
     steps = np.diff(c.times) * [1, 1e-3, *np.ones(len(c.times) - 3)]  # the path runs off and back
-    uneven = rb.chain(np.append(0, np.cumsum(steps)), c(c.times))
+    uneven = spline(np.append(0, np.cumsum(steps)), c(c.times))
     with pytest.warns(RuntimeWarning, match="a limit is exceeded by .* near s = ") as told:
         timed = rb.fastest(uneven, **NORMS)
     place = float(str(told[0].message).split()[-1])
