@@ -2,14 +2,13 @@
 
 import re
 from functools import partial
-from inspect import signature
 
 import numpy as np
 import oracles
 import pytest
+from scipy.interpolate import CubicSpline
 
 import rbcourse as rb
-from rbcourse.curves.rigid import RigidMotion, rigid_motion
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(110)
@@ -17,40 +16,39 @@ N = 9
 TIMES = -2 + np.cumsum(RNG.uniform(0.3, 1.7, N))
 ROTATIONS = np.array([oracles.exp_so3(w) for w in RNG.normal(size=(N, 3))])
 POSES = rb.pose_from_components(ROTATIONS, RNG.normal(size=(N, 3)))
-TWISTS = RNG.normal(size=(N, 6))
+TWISTS, BENDS = RNG.normal(size=(2, N, 6))
 H = np.diff(TIMES)
 
-WITHOUT_VELOCITIES = [rb.geodesic, rb.projected_line, rb.geodesic, rb.screw]
-WITH_VELOCITIES = [
-    *rb.closed_forms.FORMS.values(),
-    rb.minimum_acceleration,
-    rb.projected_cubic,
-    rb.minimum_acceleration,
-]
-LEGS = [*WITHOUT_VELOCITIES, *WITH_VELOCITIES, rb.projected_quintic]
-every_leg = pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.__name__)
+WITHOUT_VELOCITIES = [rb.geodesic, rb.projected_line, rb.screw]
+QUINTICS = [rb.projected_quintic, rb.closed_forms.exponential_quintic]
+LEGS = [*WITHOUT_VELOCITIES, *rb.closed_forms.FORMS.values(), rb.minimum_acceleration, *QUINTICS]
 both_groups = pytest.mark.parametrize("poses", [ROTATIONS, POSES], ids=["3", "4"])
-V = np.hstack([TWISTS[:, :3], np.einsum("nij,nj->ni", ROTATIONS, TWISTS[:, 3:])])
-ENDS = {"R0": ROTATIONS[:-1], "R1": ROTATIONS[1:], "A0": POSES[:-1], "A1": POSES[1:]}
-for k, rates in enumerate((V[:-1] * H[:, None], V[1:] * H[:, None])):
-    ENDS |= {f"w{k}": rates[:, :3], f"d{k}_dot": rates[:, 3:]}
 
 
-def own_poses(leg):
-    return POSES if leg.__name__.endswith("se3") else ROTATIONS
+def quintics(spline):
+    """Return the chain of quintics with the velocities and accelerations of a spline."""
+    t, leg = spline.times, rb.projected_quintic
+    return rb.chain(t, spline(t), spline(t, 1), spline(t, 2), leg=leg)
 
 
-@every_leg
+def resting(times, poses, **given):
+    return rb.projected_spline(times, poses, "rest", **given)
+
+
+@pytest.mark.parametrize("leg", LEGS, ids=lambda leg: leg.__name__)
 @both_groups
 def test_a_chain_meets_its_poses(leg, poses):
     """The chain neither changes its arguments nor reads them later."""
-    poses = POSES if own_poses(leg) is POSES else poses
-    given = [TIMES.copy(), poses.copy(), TWISTS[:, : 3 if poses is ROTATIONS else 6].copy()]
-    if leg in WITHOUT_VELOCITIES:
-        given.pop()
-    if leg is rb.projected_quintic:
-        given[2] = rb.bessel_velocities(TIMES, poses)
-    velocities = given[2].copy() if given[2:] else None
+    if leg is rb.screw and poses is ROTATIONS:
+        with pytest.raises(ValueError, match=r"^leg: start, goal: poses"):
+            rb.chain(TIMES, poses, leg=leg)
+        return
+    smooth = -1 if leg in WITHOUT_VELOCITIES else 1 + (leg in QUINTICS)
+    right = (
+        poses,
+        *(x[:, : 3 if poses is ROTATIONS else 6] for x in (TWISTS, BENDS)[: max(0, smooth)]),
+    )
+    given = [TIMES.copy(), *(x.copy() for x in right)]
     for array in given:
         array.flags.writeable = False
     c = rb.chain(*given, leg=leg)
@@ -63,48 +61,49 @@ def test_a_chain_meets_its_poses(leg, poses):
     assert np.abs(c.jumps(0)).max() < 200 * EPS
     assert c([], 1).shape == (0, 3 * c.size - 6)
     many = RNG.uniform(*c.domain, size=5000)  # these times fill more than one block
-    smooth = {rb.projected_quintic: 2}.get(leg, int(velocities is not None))
     inner = TIMES[1:-1]
     for order in range(3):
         jumps = c(inner, order) - c(np.nextafter(inner, -9), order)
-        assert np.abs(jumps - c.jumps(order)).max() < 1e-12
-        assert (np.abs(jumps).max() < 1e-12) == (order <= smooth) or velocities is None
         values = c(many, order)
         size = 1 + np.abs(values).max()
+        assert np.abs(jumps - c.jumps(order)).max() < 1e-12 * size
+        assert (np.abs(jumps).max() < 1e-12 * size) == (order <= smooth) or smooth < 0
         assert np.abs(values[::500] - c(many[::500], order)).max() < 1e-13 * size
-    if velocities is None:
+    for order, rates in enumerate(right[1:], 1):
+        assert np.abs(c(TIMES, order) - rates).max() < 4000 * EPS
+    if smooth < 0:
         assert np.abs(c.jumps(1)).max() > 0.1
+        assert c.velocities is None
     else:
-        assert np.abs(c(TIMES, 1) - velocities).max() < 400 * EPS
-        assert np.array_equal(c.velocities, velocities)
-    needed = [one.name for one in signature(leg).parameters.values() if one.default is one.empty]
-    if poses is own_poses(leg) and set(needed) <= set(ENDS):
-        one = leg(**{name: ENDS[name] for name in needed})
-        t = TIMES[:-1] + np.linspace(0, 1, 12)[:-1, None] * H
-        for order, tolerance in enumerate((60, 400, 4000)):
-            values = c(t, order).swapaxes(1, -1) * H**order
-            want = one.at_own_times((t - TIMES[:-1]) / H, order).swapaxes(1, -1)
-            assert np.abs(values - want).max() < tolerance * EPS
+        assert np.array_equal(c.velocities, right[1])
+    scales = [H.reshape(-1, *[1] * (x.ndim - 1)) ** k for k, x in enumerate(right)]
+    ends = [x for y, h in zip(right, scales, strict=True) for x in (h * y[:-1], h * y[1:])]
+    one = leg(*ends)
+    t = TIMES[:-1] + np.linspace(0, 1, 12)[:-1, None] * H
+    for order, tolerance in enumerate((60, 400, 4000)):
+        values = c(t, order).swapaxes(1, -1) * H**order
+        want = one.at_own_times((t - TIMES[:-1]) / H, order).swapaxes(1, -1)
+        assert np.abs(values - want).max() < tolerance * EPS * (1 + np.abs(want).max())
+    for time in (*TIMES, *t[3]):
+        for order, found in enumerate(c.state(time)):
+            want = c([time], order)[0]
+            assert np.abs(found - want).max() < 200 * EPS * (1 + np.abs(want).max())
+            assert np.array_equal(c(time, order), found)
 
 
-@every_leg
-def test_a_chain_rests_where_this_is_requested(leg):
+@both_groups
+def test_a_spline_rests_where_this_is_requested(poses):
     """Between two rests at the same pose, the curve stands still."""
-    poses = own_poses(leg)[[0, 1, 2, 2, 3]]
-    if leg in WITHOUT_VELOCITIES:
-        with pytest.raises(ValueError, match="rest_at: the legs take no velocities"):
-            rb.chain(range(5), poses, leg=leg, rest_at=[2])
-        assert np.abs(rb.chain(range(5), poses, leg=leg)([2.1, 2.5, 2.9], 1)).max() < 1e-13
-        return
-    for rest_at in ([2, 3], np.array([3, -3]), "repeated"):
-        c = rb.chain(range(5), poses, leg=leg, rest_at=rest_at)
-        resting = np.abs(c(range(5), 1)).max(axis=1) < 100 * EPS
-        assert resting.tolist() == [True, False, True, True, True]
-        assert np.abs(c([2.1, 2.5, 2.9]) - poses[2]).max() < 40 * EPS
+    repeated = poses[[0, 1, 2, 2, 3]]
+    for rest_at in ([2, 3], np.array([3, -3])):
+        c = resting(range(5), repeated, rest_at=rest_at)
+        still = np.abs(c(range(5), 1)).max(axis=1) < 100 * EPS
+        assert still.tolist() == [True, False, True, True, True]
+        assert np.abs(c([2.1, 2.5, 2.9]) - repeated[2]).max() < 40 * EPS
         assert np.abs(c([2.1, 2.5, 2.9], 1)).max() < 1e-13
-    one = rb.chain(range(5), own_poses(leg)[:5], leg=leg, rest_at=[2])
-    resting = np.abs(one(range(5), 1)).max(axis=1) < 100 * EPS
-    assert resting.tolist() == [True, False, True, False, True]
+    one = rb.projected_spline(range(5), poses[:5], rest_at=[2])  # the ends are natural
+    still = np.abs(one(range(5), 1)).max(axis=1) < 100 * EPS
+    assert still.tolist() == [False, False, True, False, False]
 
 
 @both_groups
@@ -113,7 +112,7 @@ def test_a_repeated_pose_is_an_ordinary_pose(poses):
     poses = poses[[0, 1, 2, 2, 3]]
     other = poses.copy()
     other[3, :3, :3] @= oracles.exp_so3([1e-9, 0, 0])
-    c, near = rb.chain(range(5), poses), rb.chain(range(5), other)
+    c, near = resting(range(5), poses), resting(range(5), other)
     assert np.abs(c.velocities - near.velocities).max() < 1e-7
     assert np.abs(c.jumps(2)).max() < 1e-12
     assert rb.acceleration_cost(c) == pytest.approx(rb.acceleration_cost(near), rel=1e-7)
@@ -122,9 +121,7 @@ def test_a_repeated_pose_is_an_ordinary_pose(poses):
 @pytest.mark.parametrize("rest_at", ["pauses", [9], [-10], [1.0], 3, [[1]]])
 def test_a_wrong_request_for_a_rest_is_refused(rest_at):
     with pytest.raises(ValueError, match="rest_at: indices"):
-        rb.chain(TIMES, POSES, rest_at=rest_at)
-    with pytest.raises(ValueError, match="rest_at: the velocities are given"):
-        rb.chain(TIMES, POSES, TWISTS, rest_at=[1])
+        rb.projected_spline(TIMES, POSES, rest_at=rest_at)
 
 
 @pytest.mark.parametrize("ratio", [1, 100, 1e4])
@@ -136,8 +133,8 @@ def test_uneven_time_steps_lose_no_digits(ratio):
     """
     steps = np.array([ratio, 1, ratio, ratio, 1, 1, 1, ratio])
     times = np.append(0, np.cumsum(steps))
-    for leg, smooth in ((rb.projected_cubic, 1), (rb.projected_quintic, 2)):
-        c = rb.chain(times, POSES, leg=leg)
+    spline = resting(times, POSES)
+    for c, smooth in ((spline, 1), (quintics(spline), 2)):
         assert np.abs(c(times) - POSES).max() < 8 * EPS
         assert np.abs(c.legs.at_own_times(steps) - POSES[1:]).max() < 8 * EPS
         speed = np.abs(c(times, 1)).max()
@@ -145,7 +142,7 @@ def test_uneven_time_steps_lose_no_digits(ratio):
         for order in range(smooth + 1):
             assert np.abs(c.jumps(order)).max() < 20 * EPS * scales[order]
     times = np.append(0, np.cumsum([1, ratio, 1, ratio, ratio, 1, 1, ratio]))
-    legs = rb.chain(times, ROTATIONS, leg=rb.projected_quintic).legs
+    legs = quintics(resting(times, ROTATIONS)).legs
     for i, share in zip(range(N - 1), [1e-9, 0.2, 0.5, 0.8, 1 - 1e-9, 0.3, 0.6, 0.9], strict=True):
         M = oracles.polynomial_through(legs.ends[i], share)
         R = oracles.nearest_rotation(M)
@@ -155,80 +152,76 @@ def test_uneven_time_steps_lose_no_digits(ratio):
 
 
 @both_groups
-def test_a_chain_without_velocities_rests_at_its_ends(poses):
+def test_a_spline_with_rests_rests_at_its_ends(poses):
     """The accelerations of the chain are continuous, and equal to those of a chain of quintics."""
     rest = np.zeros(3 if poses is ROTATIONS else 6)
-    c, chosen = rb.chain(TIMES, poses), rb.spline_velocities(TIMES, poses, (rest, rest))
+    c, chosen = resting(TIMES, poses), rb.spline_velocities(TIMES, poses, (rest, rest))
+    assert np.array_equal(c.velocities, rb.spline_velocities(TIMES, poses, "rest"))
     assert np.abs(c(TIMES, 1) - chosen).max() < 400 * EPS
     assert np.abs(c.jumps(2)).max() < 1e-12
     assert not c.velocities[[0, -1]].any()
-    quintic = rb.chain(TIMES, poses, leg=rb.projected_quintic)
-    assert np.abs(quintic(TIMES[1:-1], 2) - c(TIMES[1:-1], 2)).max() < 1e-12
-    assert np.abs(quintic(TIMES[[0, -1]], 2)).max() < 1e-12
+    for make in (rb.quaternion_spline, rb.minimum_acceleration_spline):
+        assert np.abs(make(TIMES, poses, "rest")(TIMES[[0, -1]], 1)).max() < 400 * EPS
+    quintic = quintics(c)
+    assert np.abs(quintic(TIMES, 2) - c(TIMES, 2)).max() < 1e-11
 
 
 def test_user_defined_functions_make_legs():
-    """A leg's function may be a `partial`, or combine one rotation with many paths of the origin.
+    """A leg's function may be a `partial`, and may or may not take velocities."""
 
-    A function that takes an acceleration gets a quintic for the origin; other functions get a
-    cubic.
-    """
-    t = np.linspace(*TIMES[[0, -1]], 50)
-    for same, turn in (
-        (rb.projected_quintic, lambda R0, R1, a1, **T: rb.geodesic(R0, R1, **T)),
-        (rb.projected_cubic, lambda R0, R1, w0, **T: rb.geodesic(R0, R1, **T)),
-    ):
-        path, want = (rb.chain(TIMES, POSES, leg=leg)(t)[:, :3, 3] for leg in (turn, same))
-        assert np.abs(path - want).max() < 1e-13
-
-    def slow(R0, R1, duration=1):
-        rest = np.zeros(3)
-        return rb.closed_forms.exponential_cubic(R0, R1, rest, rest, duration=duration)
-
-    def sliding(A0, A1, duration):
-        turn = rb.geodesic(np.eye(3), np.eye(3), duration=duration)
-        return rigid_motion(RigidMotion, turn, A0[:, :3, 3], A1[:, :3, 3])
+    def slow(start, goal, duration=1):
+        return rb.closed_forms.exponential_cubic(start, goal, duration=duration)
 
     c = rb.chain(TIMES, POSES, leg=slow)
-    assert np.abs(c(TIMES[:-1], 1)[:, :3]).max() < 20 * EPS  # the rotation rests at each pose
-    assert np.abs(c(TIMES[2] + 0.3 * H[2])[:3, :3] - slow(*ROTATIONS[2:4])(0.3)).max() < 40 * EPS
+    assert np.abs(c(TIMES[:-1], 1)).max() < 20 * EPS  # the body rests at each pose
+    assert np.abs(c(TIMES[2] + 0.3 * H[2]) - slow(*POSES[2:4])(0.3)).max() < 40 * EPS
     frozen = partial(rb.projected_line, f=lambda t, k: [t, 1 + 0 * t][k])
     assert np.abs(rb.chain(TIMES, ROTATIONS, leg=frozen)(TIMES) - ROTATIONS).max() < 20 * EPS
-    places = rb.pose_from_components(np.eye(3), POSES[:, :3, 3])
-    c, other = (rb.chain(TIMES, places, leg=leg) for leg in (sliding, rb.geodesic))
-    for order in range(3):
-        assert np.abs(c(t, order) - other(t, order)).max() < 1e-12
+    body = rb.Body(np.diag([1, 2, 2.5]), 3, [1, 2, 3])
+    heavy = rb.chain(TIMES, POSES, TWISTS, leg=partial(rb.projected_cubic, body=body))
+    assert repr(heavy.body) == repr(body)
 
 
 FAR = rb.pose_from_components(ROTATIONS, POSES[:, :3, 3] + [5e5, 5.3e6, 100])
 HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
 TURNS = partial(rb.geodesic, ROTATIONS[:2], ROTATIONS[1:3])
 MOVES = partial(rb.geodesic, POSES[:2], POSES[1:3])
-GIVEN = "R0, R1, w0, w1, a0, a1"
+heavy = partial(rb.projected_cubic, body=rb.Body(np.stack([np.eye(3), 2 * np.eye(3)])))
 
 
 def turned_by(w):
-    return lambda R0, R1, **T: rb.geodesic(R0, R1 @ rb.exp_so3(w), **T)
+    turn = rb.pose_from_components(rb.exp_so3(w), [0, 0, 0])
+    return lambda start, goal, **T: rb.geodesic(
+        start, goal @ turn[..., : goal.shape[-1], : goal.shape[-1]], **T
+    )
 
 
 @pytest.mark.parametrize(
     ("poses", "leg", "message"),
     [
-        (ROTATIONS, rb.geodesic, f"it needs A0, which is not among {GIVEN}; use functools"),
-        (POSES, rb.minimum_torque, f"it needs inertia, which is not among {GIVEN}, A0"),
-        (ROTATIONS, rb.exp_so3, "it has no parameter duration: <function exp_so3"),
-        (ROTATIONS, 3, "a function that makes curves is wanted, got 3"),
-        (ROTATIONS, lambda R0, duration: None, "a stack of 2 curves of these durations is wanted"),
-        (ROTATIONS, lambda duration: TURNS(duration=9), "a stack of 2 curves of these durations"),
-        (ROTATIONS, turned_by([[0] * 3, [0, 1, 0]]), "it does not lead from poses[1] to poses[2]"),
-        (FAR, turned_by([0, 0, 2e-6]), "it does not lead from poses[0] to poses[1]"),
-        (POSES, lambda A0, **T: TURNS(**T), "curves of shape (4, 4) are wanted, got (3, 3)"),
-        (POSES, lambda R0, **T: MOVES(**T), "curves of shape (3, 3) are wanted, got (4, 4)"),
+        (ROTATIONS, rb.exp_so3, "a function that takes start, goal and the keyword duration is"),
+        (ROTATIONS, 3, "a function that takes start, goal and the keyword duration is wanted (3"),
+        (ROTATIONS, rb.screw, "start, goal: poses, shape (..., 4, 4), are wanted, got rotations"),
         (
             ROTATIONS,
-            lambda w0, **T: rb.closed_forms.bezier(*HALF_TURN, w0 + 9, w0, **T),
-            "w0[0]: a norm",
+            lambda A, B, duration: None,
+            "a stack of 2 curves of these durations is wanted",
         ),
+        (
+            ROTATIONS,
+            lambda A, B, duration: TURNS(duration=9),
+            "a stack of 2 curves of these durations",
+        ),
+        (ROTATIONS, turned_by([[0] * 3, [0, 1, 0]]), "it does not lead from poses[1] to poses[2]"),
+        (FAR, turned_by([0, 0, 2e-6]), "it does not lead from poses[0] to poses[1]"),
+        (POSES, lambda A, B, **T: TURNS(**T), "curves of shape (4, 4) are wanted, got (3, 3)"),
+        (ROTATIONS, lambda A, B, **T: MOVES(**T), "curves of shape (3, 3) are wanted, got (4, 4)"),
+        (
+            ROTATIONS,
+            lambda A, B, **T: rb.closed_forms.bezier(A, B, [9, 9, 9], **T),
+            "v0[0]: an angle",
+        ),
+        (ROTATIONS, lambda A, B, **T: heavy(A, B, **T), "the same body for all legs is wanted"),
     ],
 )
 def test_functions_that_do_not_make_legs_are_refused(poses, leg, message):
@@ -246,10 +239,10 @@ PATHS = [
     (([0, 1], [-np.eye(3)] * 2), "poses[0] is not a rotation: its determinant is −1"),
     (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
 ]
-OF_PATHS = rb.chain, rb.bessel_velocities, rb.spline_velocities
+OF_PATHS = resting, rb.bessel_velocities, rb.spline_velocities
 SCREWS = partial(rb.chain, leg=rb.screw)
-LATE = rb.chain([1e9, 2e9], ROTATIONS[:2])
-UNEVEN = rb.retime(rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]), H)
+LATE = resting([1e9, 2e9], ROTATIONS[:2])
+UNEVEN = rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]).retimed(H)
 
 
 @pytest.mark.parametrize(
@@ -258,18 +251,120 @@ UNEVEN = rb.retime(rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]), H)
         *((function, *path) for function in OF_PATHS for path in PATHS),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:2, :3]), "velocities: shape (N, 6) is wanted"),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:3]), "velocities: 2 are wanted, one for each pose"),
-        (SCREWS, (TIMES, POSES, TWISTS), "velocities: the legs take no"),
+        (rb.chain, ([0, 1], POSES[:2]), "velocities: one for each pose is wanted; projected_spl"),
+        (SCREWS, ([0, 1], POSES[:2], None, BENDS[:2]), "accelerations: not without velocities"),
+        (rb.chain, ([0, 1], POSES[:2], TWISTS[:2], BENDS[:3]), "accelerations: shape (2, 6) is"),
+        (SCREWS, (TIMES, POSES, TWISTS), "leg: a function that takes start, goal, v0, v1 and the"),
+        (
+            rb.chain,
+            (TIMES, POSES, TWISTS, BENDS),
+            "leg: a function that takes start, goal, v0, v1, a0, a1 and",
+        ),
         (LATE, (3.5,), "t is 3.5, a time in [1000000000, 2000000000] is"),
         (UNEVEN.at_own_times, ([0 * H, 9 * np.eye(N - 1)[2]],), "t[1, 2] is 9.0, a time in [0, "),
-        (rb.retime, (np.sin, 1), "curve: a Curve is wanted, got"),
-        (rb.retime, (UNEVEN[0], 0), "duration is 0.0, a duration from 1e-100"),
-        (rb.retime, (UNEVEN[0], [1, 2]), "duration: a single number or shape"),
-        (rb.retime, (LATE, 1e-9), "duration is 1e-09: it vanishes by rounding when added"),
+        (UNEVEN[0].retimed, (0,), "duration is 0.0, a duration from 1e-100"),
+        (UNEVEN[0].retimed, ([1, 2],), "duration: a single number or shape"),
+        (LATE.retimed, (1e-9,), "duration is 1e-09: it vanishes by rounding when added"),
+        *(
+            (rb.projected_spline, (TIMES, POSES, ends), "ends: ")
+            for ends in ("free", (TWISTS[0, :3], None), 3)
+        ),
+        (UNEVEN[0].moved, (POSES[0],), "left: shape (3, 3) is wanted, got (4, 4)"),
+        (UNEVEN[0].moved, (None, 2 * np.eye(3)), "right is not a rotation"),
+        (LATE.moved, (ROTATIONS[:2],), "left: shape (3, 3) is wanted, got (2, 3, 3)"),
     ],
 )
 def test_bad_paths_and_durations_are_refused(function, arguments, message):
     with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
         function(*arguments)
+
+
+GRIP = rb.Body(np.diag([0.2, 0.3, 0.4]), 2, [0.1, -0.2, 0.3])
+FRAMES = rb.pose_from_coordinates([[0.3, -1, 2, 4, 5, -6], [1, 0.5, -0.4, 0.3, 0.2, 0.1]])
+PATHS_OF = {
+    "spline": partial(rb.projected_spline, body=GRIP),
+    "quaternions": rb.quaternion_spline,
+    "optimum": partial(rb.minimum_acceleration_spline, body=GRIP),
+    "screws": lambda t, poses: rb.chain(t, poses, leg=rb.geodesic),
+}
+
+
+@pytest.mark.parametrize("name", PATHS_OF)
+@both_groups
+def test_a_chain_that_is_moved_is_a_chain_with_the_same_costs(name, poses):
+    size = poses.shape[-1]
+    c, (L, X) = PATHS_OF[name](TIMES, poses), FRAMES[:, :size, :size]
+    other, t = c.moved(L, X), TIMES[:-1] + 0.3 * H
+    assert other.domain == c.domain
+    assert np.array_equal(other.times, TIMES)
+    assert np.abs(other(t) - L @ c(t) @ X).max() < 1e-13
+    rate = np.linalg.inv(other(t)) @ oracles.derivative_by_differences(other, t, 1e-3)
+    assert np.abs(other(t, 1) - (rb.vee_so3 if size == 3 else rb.vee_se3)(rate)).max() < 1e-9
+    slope = oracles.derivative_by_differences(lambda t: other(t, 1), t, 1e-3)
+    assert np.abs(other.twist_rate(t) - slope).max() < 1e-8
+    if c.velocities is not None:
+        assert np.abs(other.velocities - other(TIMES, 1)).max() < 1e-12
+        cost = rb.acceleration_cost(c)
+        assert rb.acceleration_cost(other) == pytest.approx(cost, rel=1e-9)
+    slow, back = other.retimed(2 * np.ptp(TIMES)), other.moved(np.linalg.inv(L), np.linalg.inv(X))
+    for order in range(3):
+        assert np.abs(slow(slow.times, order) * 2**order - other(TIMES, order)).max() < 1e-11
+        assert np.abs(back(t, order) - c(t, order)).max() < 1e-11
+
+
+@pytest.mark.parametrize(
+    "turn",
+    [
+        rb.projected_spline(TIMES, ROTATIONS, body=GRIP),
+        rb.minimum_acceleration_spline(TIMES, ROTATIONS),
+        rb.projected_cubic(*ROTATIONS[:2], body=GRIP, duration=2),
+    ],
+)
+def test_a_rotation_and_a_position_are_joined(turn):
+    """The knots of the position are not those of the rotation."""
+    (start, end), ball = turn.domain, rb.Body.ball()
+    knots = start + (end - start) * np.array([0, 0.15, 0.6, 0.85, 1])
+    path = CubicSpline(knots, POSES[:5, :3, 3])
+    t = np.append(np.linspace(start, end, 24), knots)
+    joined = rb.joined(turn, path)
+    for c, k in ((joined, 1), (joined.retimed(3 * (end - start)), 3)):
+        times = np.minimum(start + k * (t - start), c.domain[1])
+        assert c.domain == pytest.approx((start, start + k * (end - start)))
+        state, R = c.state(times), turn(t)
+        assert np.abs(state.pose - rb.pose_from_components(R, path(t))).max() < 1e-12
+        for order in (1, 2):
+            v = (R.mT @ path(t, order)[..., None])[..., 0]
+            want = np.hstack([turn(t, order), v]) / k**order
+            assert np.abs(state[order] - want).max() < 1e-11
+        for i in (0, 7, -1):
+            for one, found in zip(c.state(times[i]), state, strict=True):
+                assert np.abs(one - found[i]).max() < 1e-12
+        if hasattr(turn, "times"):  # a chain remains a chain
+            assert np.abs(c.velocities - c(c.times, 1)).max() < 1e-12
+        assert c.body is turn.body
+        rotation, translation = rb.acceleration_cost_parts(c, body=ball)
+        want = rb.acceleration_cost(turn, body=ball) / k**3
+        assert rotation == pytest.approx(want, rel=1e-9)
+        a = path(knots, 2)
+        squares = np.sum(a[:-1] ** 2 + a[:-1] * a[1:] + a[1:] ** 2, axis=1) / 3
+        assert translation == pytest.approx(squares @ np.diff(knots) / k**3, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("turn", "path", "message"),
+    [
+        *(
+            (turn, np.sin, "rotation: a single curve on SO(3) is wanted, got ")
+            for turn in (UNEVEN, rb.geodesic(*POSES[:2]), ROTATIONS[0])
+        ),
+        (UNEVEN[0], POSES[:2, :3, 3], "position: a callable position(t, order) is wanted, got a"),
+        (UNEVEN[0], lambda t, k: np.zeros(3), "position(t, 0): shape (1, 3) is wanted, got (3,)"),
+        (UNEVEN[0], lambda t, k: np.full((1, 3), np.nan), "position(t, 0)[0, 0] is nan, a finite"),
+    ],
+)
+def test_errors_name_the_part_that_cannot_be_joined(turn, path, message):
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
+        rb.joined(turn, path)(0)
 
 
 def test_errors_name_the_leg():
@@ -291,7 +386,7 @@ def test_errors_name_the_leg():
 
 @pytest.mark.parametrize("duration", [1e-9, 0.25, 3, 1e12])
 def test_retiming_a_chain_scales_its_times_uniformly(duration):
-    c = rb.chain(TIMES, POSES)
+    c = resting(TIMES, POSES)
     again, (first, last) = c.retimed(duration), c.domain
     start, end = again.domain
     assert (start, end) == (first, first + duration)
@@ -302,23 +397,25 @@ def test_retiming_a_chain_scales_its_times_uniformly(duration):
         want = c(np.clip(first + (t - start) * rate, first, last), order) * rate**order
         assert np.abs(again(t, order) - want).max() <= tolerance * np.abs(want).max()
     assert np.abs(again([start, end]) - c([first, last])).max() < 60 * EPS
-    again = rb.retime(rb.chain(1.3e9 + TIMES, ROTATIONS), 1e-3)  # the times are seconds since 1970
+    again = resting(1.3e9 + TIMES, ROTATIONS).retimed(1e-3)  # the times are seconds since 1970
     assert np.abs(again.legs.duration / H * np.ptp(TIMES) / 1e-3 - 1).max() < 1e-5
     assert np.abs(again(again.domain) - ROTATIONS[[0, -1]]).max() < 1e-12
-    assert rb.retime(rb.chain([0, 1e50], POSES[:2]), 1e-40).domain == (0, 1e-40)
+    assert resting([0, 1e50], POSES[:2]).retimed(1e-40).domain == (0, 1e-40)
 
 
 def test_the_cost_of_a_chain_whose_velocity_jumps_raises_an_error():
     """In the second chain only the angular velocity jumps. The jump is small, and the motion is
     fast."""
 
-    def uneven(R0, R1, w0, w1, duration):
-        return rb.projected_cubic(R0, R1, w0 * (1 + 1e-6), w1, duration=duration)
+    def uneven(start, goal, v0, v1, duration):
+        scale = 1 + 1e-6 * (np.arange(6) < 3)
+        return rb.projected_cubic(start, goal, v0 * scale, v1, duration=duration)
 
     fast = rb.pose_from_components(ROTATIONS, 1e6 * POSES[:, :3, 3])
-    for poses, leg in ((POSES, rb.geodesic), (fast, uneven)):
+    V = rb.spline_velocities(TIMES, fast)
+    for c in (rb.chain(TIMES, POSES, leg=rb.geodesic), rb.chain(TIMES, fast, V, leg=uneven)):
         with pytest.raises(RuntimeError, match=r"^acceleration cost: a velocity jumps at a joint"):
-            rb.acceleration_cost(rb.chain(TIMES, poses, leg=leg))
+            rb.acceleration_cost(c)
     assert rb.acceleration_cost(rb.chain([0, 9], POSES[:2], leg=rb.geodesic)) == 0
     stops = rb.chain(TIMES, POSES, 0 * TWISTS, leg=rb.minimum_acceleration)
     assert 0 < rb.acceleration_cost(stops) < np.inf
@@ -330,7 +427,7 @@ def test_moving_a_chain_far_from_the_origin_keeps_the_motion():
     here = rb.pose_from_coordinates(t[:, None] * [0, 0, 4e-3, 4e-3, 0, 0])
     far = here.copy()
     far[:, :3, 3] += [5e5, 5.3e6, 100]
-    c, other = rb.chain(t, far), rb.chain(t, here)
+    c, other = resting(t, far), resting(t, here)
     assert np.abs(c.velocities[10:-10, [2, 3]] / 4e-3 - 1).max() < 1e-3
     assert np.abs(c.velocities - other.velocities).max() < 1e-5
     assert np.abs(c.jumps(1)).max() < 1e-12
@@ -338,14 +435,14 @@ def test_moving_a_chain_far_from_the_origin_keeps_the_motion():
     assert turning == pytest.approx(same, rel=1e-9)
     far = POSES[:3].copy()
     far[:, :3, 3] *= 1e11
-    assert np.abs(rb.chain(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
+    assert np.abs(resting(range(3), far)(1)[:3, 3] / far[1, :3, 3] - 1).max() < 1e-15
 
 
 def test_small_turns_and_turns_near_a_half_turn_are_accurate():
     near_half_turn = np.pi + 1e-6 - 1e-5
     R = rb.exp_so3(np.outer([0, 1e-6, 2e-6, near_half_turn], [0, 0, 1]))
-    assert np.abs(rb.chain(range(3), R[:3]).velocities[1] - [0, 0, 1.5e-6]).max() < 1e-12
-    assert np.abs(rb.log_so3(rb.chain([0, 1], R[1::2])(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
+    assert np.abs(resting(range(3), R[:3]).velocities[1] - [0, 0, 1.5e-6]).max() < 1e-12
+    assert np.abs(rb.log_so3(resting([0, 1], R[1::2])(0.5)) - [0, 0, np.pi / 2]).max() < 1e-4
 
 
 def test_a_parabola_through_three_poses_has_bessels_velocities():
