@@ -72,7 +72,7 @@ def makers():
             if option in has and has[option].default is has[option].empty
         ]
         for option in [None, *(option for option in OPTIONS if option in has)]:
-            options = {*needed, option} - {None}
+            options = sorted({*needed, option} - {None})
             for size in {3, 4} - {REFUSED.get(name)}:
                 found["-".join([name, *options, str(size)])] = Maker(function, size, *options)
     return found

@@ -357,6 +357,11 @@ def test_a_rotation_and_a_position_are_joined(turn):
             (turn, np.sin, "rotation: a single curve on SO(3) is wanted, got ")
             for turn in (UNEVEN, rb.geodesic(*POSES[:2]), ROTATIONS[0])
         ),
+        (
+            rb.fastest(LATE, angular_acceleration=1),
+            np.sin,
+            "rotation: it is a Timed; join its path and the position, then call fastest",
+        ),
         (UNEVEN[0], POSES[:2, :3, 3], "position: a callable position(t, order) is wanted, got a"),
         (UNEVEN[0], lambda t, k: np.zeros(3), "position(t, 0): shape (1, 3) is wanted, got (3,)"),
         (UNEVEN[0], lambda t, k: np.full((1, 3), np.nan), "position(t, 0)[0, 0] is nan, a finite"),

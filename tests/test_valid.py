@@ -6,6 +6,7 @@ import numpy as np
 import oracles
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
+from test_contract import REFUSED
 from test_functions import exported
 
 import rbcourse as rb
@@ -19,18 +20,14 @@ ANY = {"is_so", "is_se", "is_unit_quaternion", "vee_so3", "hat_se3", "exp_se3", 
 ANY |= {"project_so", "project_se", "project_quaternion", "project_so_weighted"}
 ANY |= {"orthonormalize_gram_schmidt", "distance_to_so", "planar_from_matrix"}
 ANY |= {"quaternion_multiply", "quaternion_conjugate", "canonical_quaternion"}
+ANY |= {"interpolate_joints", "interpolate_planar"}
 ANY |= {"continuous_quaternions", "arm_forward_kinematics", "arm_tip_jacobian"}
 """Functions of matrices or quaternions that need not be valid, or of other arguments."""
 
 ARGUMENTS = {
     "R": TURN,
     "S": GOAL,
-    "R0": TURN,
-    "R1": GOAL,
     "A": POSE,
-    "A0": POSE,
-    "A1": END,
-    "rotations": np.stack([TURN, GOAL]),
     "poses": np.stack([POSE, END]),
     "q": QUATERNION,
     "q0": QUATERNION,
@@ -39,7 +36,7 @@ ARGUMENTS = {
     "t": 0.5,
     "p": np.ones(3),
     "d": np.ones(3),
-    "inertia": np.diag([1.0, 2, 2.5]),
+    "body": rb.Body(np.diag([1.0, 2, 2.5])),
     "name": "projected_cubic",
     "x": np.ones(6),
     "v0": np.ones(6),
@@ -47,34 +44,46 @@ ARGUMENTS = {
     "Y": metrics.tangent_from_components(POSE, np.ones(6)),
     "G": np.eye(6),
 }
-ARGUMENTS |= dict.fromkeys(["w0", "w1", "a0", "a1", "d0_dot", "d1_dot"], np.full(3, 0.1))
+RATES = {"v0": 1, "v1": 2, "a0": 3, "a1": 4, "velocities": np.ones((2, 1))}
+OF_GROUP = {
+    size: {"start": A, "goal": B, "poses": np.stack([A, B])}
+    | {name: np.full(n, 0.1) * x for name, x in RATES.items()}
+    for size, n, A, B in ((3, 3, TURN, GOAL), (4, 6, POSE, END))
+}
+"""Arguments that may belong to rotations or to poses."""
+REFUSED = REFUSED | {"minimum_torque_spline": 4, "minimum_jerk_spline": 4}
 
 
-def taken(function):
+def taken(function, size):
     """Return the valid arguments of a function, by name; uniformity needs many rotations."""
-    parameters = inspect.signature(function).parameters.values()
-    names = [one.name for one in parameters if one.default is one.empty]
-    given = {name: ARGUMENTS[name] for name in names if name in ARGUMENTS}
+    parameters = inspect.signature(function).parameters
+    of_group = OF_GROUP[size] if {"start", "poses"} & set(parameters) else {}
+    arguments = ARGUMENTS | of_group
+    names = [x.name for x in parameters.values() if x.default is x.empty or x.name in of_group]
+    given = {name: arguments[name] for name in names if name in arguments}
     if function is rb.sampling.uniformity_tests:
         given = {"R": rb.sample_rotation(100, rng=1)}
     return given if set(given) == set(names) else {}
 
 
-CASES = [
-    (name, function, argument)
+CHECKED = {"R", "S", "A", "start", "goal", "poses", "q", "q0", "q1"}
+CASES = {
+    f"{name}-{argument}-{size}": (function, size, argument)
     for name, function in sorted(exported().items())
     if name not in ANY and name != "write_path"
-    for argument in taken(function)
-    if argument in ("R", "S", "A", "R0", "R1", "A0", "A1", "rotations", "poses", "q", "q0", "q1")
-]
+    for size in {3, 4} - {REFUSED.get(name)}
+    for argument in taken(function, size)
+    if argument in CHECKED and (size == 4 or argument in OF_GROUP[3])
+}
 every_argument = pytest.mark.parametrize(
-    ("name", "function", "argument"), CASES, ids=[f"{name}-{one}" for name, _, one in CASES]
+    ("function", "size", "argument"), CASES.values(), ids=CASES
 )
 
 
 def test_the_rule_holds_for_all_functions_of_rotations_poses_and_quaternions():
-    assert len({name for name, *_ in CASES}) > 45
-    assert {"log_so3", "chain", "slerp"} <= {name for name, *_ in CASES}
+    names = {name.partition("-")[0] for name in CASES}
+    assert len(names) > 45
+    assert {"log_so3", "chain", "slerp", *REFUSED} <= names
 
 
 def numbers(result):
@@ -107,8 +116,8 @@ def wrong_values(value):
 
 
 @every_argument
-def test_an_invalid_argument_is_refused_with_its_deviation(name, function, argument):
-    given = taken(function)
+def test_an_invalid_argument_is_refused_with_its_deviation(function, size, argument):
+    given = taken(function, size)
     for value in wrong_values(given[argument]):
         with pytest.raises(ValueError, match=rf"^{argument}.* (project_|its last row is)") as told:
             function(**given | {argument: value})
@@ -118,8 +127,8 @@ def test_an_invalid_argument_is_refused_with_its_deviation(name, function, argum
 
 
 @every_argument
-def test_numbers_in_single_precision_are_repaired(name, function, argument):
-    given = taken(function)
+def test_numbers_in_single_precision_are_repaired(function, size, argument):
+    given = taken(function, size)
     exact = numbers(function(**given))
     single = function(**given | {argument: given[argument].astype(np.float32)})
     assert np.abs(numbers(single) - exact).max() < 1e-5 * np.abs(exact).max()
@@ -130,8 +139,8 @@ def test_numbers_in_single_precision_are_repaired(name, function, argument):
 
 
 @every_argument
-def test_scipy_objects_are_accepted(name, function, argument):
-    given = taken(function)
+def test_scipy_objects_are_accepted(function, size, argument):
+    given = taken(function, size)
     value = given[argument]
     if value.ndim == 1:
         return
@@ -163,7 +172,7 @@ def test_the_message_names_the_entry_and_the_converter():
         with pytest.raises(ValueError, match=f"is wanted, got .*; {message} makes poses of"):
             rb.log_se3(value)
     with pytest.raises(ValueError, match=r"poses: .*; pose_from_components makes poses"):
-        rb.chain([0, 1], np.ones((2, 7)))
+        rb.projected_spline([0, 1], np.ones((2, 7)))
 
 
 def test_deviations_are_measured_to_rounding():

@@ -239,6 +239,10 @@ def joined(rotation: Curve, position: Position) -> Curve:
     """
     if not isinstance(rotation, Curve) or rotation.size != 3 or rotation.batch_shape:
         raise ValueError(f"rotation: a single curve on SO(3) is wanted, got {rotation!r}")
+    if hasattr(rotation, "progress"):
+        raise ValueError(
+            "rotation: it is a Timed; join its path and the position, then call fastest"
+        )
     if not callable(position):
         raise ValueError(f"position: a callable position(t, order) is wanted, got {position!r}")
     if not isinstance(rotation, Chain):
