@@ -36,6 +36,8 @@ ARGUMENTS = {
     "t": 0.5,
     "p": np.ones(3),
     "d": np.ones(3),
+    "w": np.ones(3),
+    "d_dot": np.ones(3),
     "body": rb.Body(np.diag([1.0, 2, 2.5])),
     "name": "projected_cubic",
     "x": np.ones(6),
