@@ -16,18 +16,17 @@ from functools import partial
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
 from rbclassroom.figures import FORMS, quantile, rounded
-from rbcourse import Array, Curve, Ends, exp_so3, sample_rotation
+from rbcourse import Array, Body, Curve, exp_so3, sample_rotation
 from rbcourse.draw.save import csv_text
 from rbcourse.files import replace_file
-from rbcourse.metrics import METRIC_SO3, box_inertia
 from rbcourse.sampling import Rng
 
 Makers = Mapping[str, Callable[..., Curve]]
@@ -43,26 +42,46 @@ CHUNK = 500
 """The number of problems that are computed together."""
 
 BODIES = {
-    "ball": METRIC_SO3,
-    "brick": box_inertia([0.28, 0.24, 0.20]),
-    "book": box_inertia([0.30, 0.20, 0.03]),
+    "ball": Body.ball(),
+    "brick": Body.box([0.28, 0.24, 0.20]),
+    "book": Body.box([0.30, 0.20, 0.03]),
 }
-"""The inertia of a ball, of a brick that is nearly a cube, and of a book."""
+"""A ball, a brick that is nearly a cube, and a book."""
 DOMAINS = {"small": 2, "medium": 5, "all": CELLS}
 """For each domain, the number of steps of displacement and end velocity, counted from 0."""
 TABLES = Path(__file__).parent
 
 
-def closed_forms(inertia: ArrayLike | None = None) -> Makers:
-    """Return the closed forms that are compared for a body: `FORMS`, and two for its inertia."""
-    if inertia is None:
+class Problems(NamedTuple):
+    """Rotations and angular velocities at both ends of N curves.
+
+    ``make(*problems)`` calls a function ``make(R0, R1, w0, w1)``.
+
+    Parameters
+    ----------
+    R0, R1, w0, w1 : ndarray, shapes (N, 3, 3) and (N, 3)
+    """
+
+    R0: Array
+    R1: Array
+    w0: Array
+    w1: Array
+
+    def take(self, index: Any) -> Problems:
+        """Return the problems that a NumPy index selects."""
+        return Problems._make(x[index] for x in self)
+
+
+def closed_forms(body: Body | None = None) -> Makers:
+    """Return the closed forms that are compared: `FORMS`, and two that depend on a given body."""
+    if body is None:
         return FORMS
-    weighted = partial(rb.weighted_cubic_so3, inertia=inertia)
-    normal = partial(rb.closed_forms.normal_cubic, inertia=inertia)
+    weighted = partial(rb.projected_cubic, body=body)
+    normal = partial(rb.closed_forms.normal_cubic, body=body)
     return {"projection": FORMS["projection"], "weighted": weighted, **FORMS, "normal": normal}
 
 
-def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng = None) -> Ends:
+def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng = None) -> Problems:
     """Return `draws` random problems in every cell of the atlas.
 
     A cell is a family, a step of the displacement ‖σ‖ from 0 to π, and a step of the end velocity v
@@ -89,10 +108,10 @@ def atlas_problems(draws: int, families: Sequence[str] = FAMILIES, *, rng: Rng =
             ways["any"] = sample_rotation(count, rng=rng)[..., 0]
         direction = np.choose(family[:, None], [ways[name] for name in families])
         velocities.append(size[:, None] * direction)
-    return Ends(R0, R0 @ exp_so3(angle[:, None] * axis), *velocities)
+    return Problems(R0, R0 @ exp_so3(angle[:, None] * axis), *velocities)
 
 
-def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
+def random_problems(count: int, size: float, *, rng: Rng = None) -> Problems:
     """Return problems with σ in a ball of radius `size`, and w0 and w1 in a ball twice as large."""
     rng = np.random.default_rng(rng)
     radii = size * np.array([[1.0], [2.0], [2.0]]) * np.cbrt(rng.random((3, count)))
@@ -100,14 +119,14 @@ def random_problems(count: int, size: float, *, rng: Rng = None) -> Ends:
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     sigma, w0, w1 = radii[..., None] * directions
     R0 = sample_rotation(count, rng=rng)
-    return Ends(R0, R0 @ exp_so3(sigma), w0, w1)
+    return Problems(R0, R0 @ exp_so3(sigma), w0, w1)
 
 
 def survey(
-    problems: Ends,
+    problems: Problems,
     executor: Executor | None = None,
     *,
-    inertia: ArrayLike | None = None,
+    body: Body | None = None,
     ways: Makers | None = None,
     title: str = "",
 ) -> dict[str, Array]:
@@ -120,14 +139,13 @@ def survey(
 
     Parameters
     ----------
-    problems : Ends
-        Arrays with one batch axis.
+    problems : Problems
     executor : concurrent.futures.Executor, optional
         Computes chunks of `CHUNK` problems, for example ``Client(...).get_executor()`` of
         dask.distributed. By default new processes compute them if there are several chunks; a
         script then calls this function below ``if __name__ == "__main__":``.
-    inertia : array_like, shape (3, 3), optional
-        The inertia of the body in body axes. By default the body is a ball.
+    body : Body, optional
+        The body that moves; the default is the ball.
     ways : mapping of str to callable, optional
         Functions ``make(R0, R1, w0, w1)`` of the compared curves, by default `closed_forms`. Other
         processes need functions of a module, or partials of these.
@@ -139,7 +157,7 @@ def survey(
     >>> found = survey(random_problems(3, 1, rng=1), title="Problems")
     Problems: 3 of 3
     """
-    work = partial(_survey_chunk, closed_forms(inertia) if ways is None else ways, inertia)
+    work = partial(_survey_chunk, closed_forms(body) if ways is None else ways, body)
     total = len(problems.w0)
     chunks = [problems.take(slice(k, k + CHUNK)) for k in range(0, max(total, 1), CHUNK)]
     parts = list[dict[str, Array]]()
@@ -161,33 +179,34 @@ def survey(
     return _joined(parts)
 
 
-def _survey_chunk(ways: Makers, inertia: ArrayLike | None, chunk: Ends) -> dict[str, Array]:
+def _survey_chunk(ways: Makers, body: Body | None, chunk: Problems) -> dict[str, Array]:
     # neither a cost of NaN nor a small margin needs a warning
     with threadpool_limits(1), warnings.catch_warnings(category=RuntimeWarning, action="ignore"):
-        found = {"optimum": np.asarray(rb.minimum_acceleration(*chunk, inertia).cost)}
+        found = {"optimum": np.asarray(rb.minimum_acceleration(*chunk, body=body).cost)}
         for name, make in ways.items():
             try:
-                found[name] = costs(make, chunk, inertia)
+                found[name] = costs(make, chunk, body)
             except Exception as error:
                 error.add_note(f"This is the curve {name!r} of the survey.")
                 raise
     return found
 
 
-def costs(make: Callable[..., Curve], problems: Ends, inertia: ArrayLike | None = None) -> Array:
+def costs(make: Callable[..., Curve], problems: Problems, body: Body | None = None) -> Array:
     """Return the costs of the curves ``make(R0, R1, w0, w1)`` for N problems, as `survey` does."""
-    return np.asarray(rb.acceleration_cost(make(*problems), inertia, rtol=1e-6))
+    return np.asarray(rb.acceleration_cost(make(*problems), body=body or Body.ball(), rtol=1e-6))
 
 
-def excesses(ends: Ends, found: Columns, inertia: ArrayLike | None = None) -> Columns:
+def excesses(problems: Problems, found: Columns, body: Body | None = None) -> Columns:
     """Return the excesses in a survey: each cost divided by the optimum's cost, minus 1.
 
     The excess is NaN if the optimum was not found, or if its cost is too small for a ratio: below
-    1e-4 (‖σ‖² + ‖w0‖² + ‖w1‖²), where ‖x‖² denotes ½ xᵀ G x. For a ball, G = 2 I.
+    1e-4 (‖σ‖² + ‖w0‖² + ‖w1‖²), where ‖x‖² denotes ½ xᵀ G x with the
+    inertia G of the body (2 I for the ball).
     """
-    half = np.eye(3) if inertia is None else np.asarray(inertia) / 2
-    sigma = rb.log_so3(ends.R0.mT @ ends.R1)
-    size = sum(np.sum(x * (x @ half), axis=-1) for x in (sigma, ends.w0, ends.w1))
+    half = (body or Body.ball()).inertia / 2
+    R0, R1, w0, w1 = problems
+    size = sum(np.sum(x * (x @ half), axis=-1) for x in (rb.log_so3(R0.mT @ R1), w0, w1))
     optimum = np.where(found["optimum"] < 1e-4 * size, np.nan, found["optimum"])
     return {way: cost / optimum - 1 for way, cost in found.items() if way != "optimum"}
 
@@ -213,7 +232,7 @@ def cell_table(
 
 
 def body_excesses(
-    ends: Ends, inertia: Array, executor: Executor | None = None, title: str = ""
+    problems: Problems, body: Body, executor: Executor | None = None, title: str = ""
 ) -> Columns:
     """Return the excesses of all curves of lesson 13.
 
@@ -221,10 +240,11 @@ def body_excesses(
     long way round; "three", the cheapest of these two and "normal"; and the optimum for a ball.
     """
     # the correction of the corrected Bézier curve is for a ball
-    forms = {name: make for name, make in closed_forms(inertia).items() if name != "corrected"}
-    ways: Makers = {"long way": rb.bezier_long_so3, "ball's optimum": rb.minimum_acceleration}
-    found = survey(ends, executor, inertia=inertia, ways={**forms, **ways}, title=title)
-    excess = excesses(ends, found, inertia)
+    forms = {name: make for name, make in closed_forms(body).items() if name != "corrected"}
+    long = partial(rb.closed_forms.bezier, long=True)
+    ways: Makers = {"long way": long, "ball's optimum": rb.minimum_acceleration}
+    found = survey(problems, executor, body=body, ways={**forms, **ways}, title=title)
+    excess = excesses(problems, found, body)
     two = np.fmin(excess["Bézier"], excess["long way"])
     excess |= {"two Béziers": two, "three": np.fmin(two, excess["normal"])}
     return {name: excess[name] for name in (*forms, "two Béziers", "three", "ball's optimum")}
@@ -277,19 +297,20 @@ def write_tables(
 ) -> None:
     """Compute both tables of lesson 13, with `draws` problems in each cell for each seed."""
     tables: dict[str, list[Columns]] = {"maps": [], "intervals": []}
-    for seed, (body, inertia) in product(seeds, BODIES.items()):
+    for seed, (name, body) in product(seeds, BODIES.items()):
         problems = atlas_problems(draws, ["any"], rng=seed)
-        excess = body_excesses(problems, inertia, executor, f"{body}, seed {seed}")
-        cells = cell_table(excess, draws, {"median": 0.5, "90 %": 0.9}, [body])
+        excess = body_excesses(problems, body, executor, f"{name}, seed {seed}")
+        cells = cell_table(excess, draws, {"median": 0.5, "90 %": 0.9}, [name])
         known = intervals(excess, draws)
-        named = {"seed [1]": seed, "body": body}
+        named = {"seed [1]": seed, "body": name}
         columns = {key: np.full(len(known["curve"]), x) for key, x in named.items()}
         tables["intervals"].append(columns | known)
         if seed == seeds[0]:
             tables["maps"].append({"body": cells.pop("family")} | cells)
-    for name, parts in tables.items():
-        replace_file(TABLES / f"atlas_{name}.csv", csv_text(_joined(parts)).encode())
-        print(f"{TABLES / f'atlas_{name}.csv'} is written.")
+    for table, parts in tables.items():
+        file = TABLES / f"atlas_{table}.csv"
+        replace_file(file, csv_text(_joined(parts)).encode())
+        print(f"{file} is written.")
 
 
 def _joined(parts: Sequence[Columns]) -> Columns:

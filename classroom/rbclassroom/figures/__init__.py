@@ -7,14 +7,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.optimize import isotonic_regression
 
-from rbcourse import CLOSED_FORMS, Array, Curve
+from rbcourse import Array, Curve, closed_forms
 from rbcourse.draw.save import Table
 
 _SHORT = {"projected": "projection", "bezier": "Bézier", "cayley": "Cayley"}
 FORMS: dict[str, Callable[..., Curve]] = {
-    _SHORT.get(first := name.partition("_")[0], first): make for name, make in CLOSED_FORMS.items()
+    _SHORT.get(first := name.partition("_")[0], first): make
+    for name, make in closed_forms.FORMS.items()
 }
-"""The `rbcourse.CLOSED_FORMS` by their short names in figures and tables: their first words."""
+"""The `rbcourse.closed_forms.FORMS` by their short names in figures and tables."""
 
 
 def columns(form: str, vectors: Mapping[str, Array], letters: str = "xyz") -> dict[str, Array]:

@@ -10,6 +10,7 @@ from scipy.stats import binom
 
 import rbcourse as rb
 from rbclassroom import atlas
+from rbclassroom.atlas import Problems
 from rbclassroom.figures import FORMS, quantile, rounded
 
 SOME = atlas.random_problems(60, 3, rng=2)
@@ -47,28 +48,26 @@ def test_random_problems_are_uniform_in_balls():
 
 
 @pytest.mark.source("BK (18)", "beyond BK 1", "beyond BK 2")
-@pytest.mark.parametrize("inertia", [None, BOOK], ids=["ball", "book"])
-def test_a_survey_has_the_optimum_and_the_cost_of_every_curve(inertia):
-    sharp = rb.Ends(np.eye(3)[None], rb.exp_so3([[0, 0, np.radians(179.8)]]), *np.zeros((2, 1, 3)))
+@pytest.mark.parametrize("body", [None, BOOK], ids=["ball", "book"])
+def test_a_survey_has_the_optimum_and_the_cost_of_every_curve(body):
+    sharp = Problems(np.eye(3)[None], rb.exp_so3([[0, 0, np.radians(179.8)]]), *np.zeros((2, 1, 3)))
     assert rb.projected_cubic(*sharp).margin < 0.004
-    few = rb.Ends(*map(np.concatenate, zip(sharp, SOME.take(slice(20)), strict=True)))
-    found, best = atlas.survey(few, inertia=inertia), rb.minimum_acceleration(*few, inertia)
+    few = Problems(*map(np.concatenate, zip(sharp, SOME.take(slice(20)), strict=True)))
+    found, best = atlas.survey(few, body=body), rb.minimum_acceleration(*few, body=body)
     assert found.pop("optimum") == pytest.approx(best.cost, rel=1e-12)
-    of_body = {"weighted": rb.weighted_cubic_so3, "normal": rb.closed_forms.normal_cubic}
-    makers = FORMS | {way: partial(make, inertia=inertia) for way, make in of_body.items()}
-    assert set(found) == set(FORMS if inertia is None else makers)
+    of_body = {"weighted": rb.projected_cubic, "normal": rb.closed_forms.normal_cubic}
+    makers = FORMS | {way: partial(make, body=body) for way, make in of_body.items()}
+    assert set(found) == set(FORMS if body is None else makers)
     for way, cost in found.items():
-        assert cost == pytest.approx(rb.acceleration_cost(makers[way](*few), inertia), rel=1e-6)
+        exact = rb.acceleration_cost(makers[way](*few), body=body or rb.Body.ball())
+        assert cost == pytest.approx(exact, rel=1e-6)
         assert np.all(cost > (1 - 1e-6) * best.cost)
 
 
 def test_every_executor_gives_the_same_bytes(monkeypatch, capsys):
     monkeypatch.setattr(atlas, "CHUNK", 5)
-    few, known, found = (
-        SOME.take(slice(15)),
-        {"inertia": BOOK, "ways": {"z": rb.closed_forms.bezier}},
-        [],
-    )
+    few, found = SOME.take(slice(15)), []
+    known = {"body": BOOK, "ways": {"z": rb.closed_forms.bezier}}
     with ThreadPoolExecutor(3) as threads:
         threads.submit = Mock(wraps=threads.submit)
         for executor in (None, threads):
@@ -93,7 +92,7 @@ def test_the_excess_is_nan_if_the_optimum_is_near_zero():
     a, d = 1.0, np.array([0.0, 0.005, 0.01, 0.5])
     e, R0 = np.eye(3)[2], np.tile(np.eye(3), (4, 1, 1))
     w = (a + d)[:, None] * e
-    ends = rb.Ends(R0, rb.exp_so3(np.tile(a * e, (4, 1))), w, w)
+    ends = Problems(R0, rb.exp_so3(np.tile(a * e, (4, 1))), w, w)
     excess = atlas.excesses(ends, {"optimum": 24 * d**2, "other": 48 * d**2})
     assert list(excess) == ["other"]
     assert excess["other"] == pytest.approx([np.nan, 1, 1, 1], nan_ok=True)
@@ -119,7 +118,7 @@ def test_the_table_has_quantiles_of_the_sample_for_each_cell():
 def test_the_maps_use_only_the_first_seed_and_intervals_are_binomial(tmp_path, monkeypatch):
     made = []
 
-    def invented(problems, inertia, executor, title):
+    def invented(problems, body, executor, title):
         x = 0.2 * np.random.default_rng(len(made)).random(5000)
         x[:7] = np.nan
         made.append(x)
