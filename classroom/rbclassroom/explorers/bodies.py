@@ -68,13 +68,13 @@ def body_explorer() -> Explorer:
 
 @lru_cache(maxsize=64)
 def _solved(about: str, turn: float, thickness: float) -> Any:
-    G, rest = rb.metrics.box_inertia([_LENGTH, _WIDTH, thickness / 100]), np.zeros(3)
-    ends = np.eye(3), rb.exp_so3(np.radians(turn) * _AXES[about]), rest, rest
+    book = rb.Body.box([_LENGTH, _WIDTH, thickness / 100])
+    ends = np.eye(3), rb.exp_so3(np.radians(turn) * _AXES[about])
     curves: list[rb.Curve] = [
         rb.minimum_acceleration(*ends),
-        rb.minimum_acceleration(*ends, G),
-        rb.minimum_torque(*ends, G),
+        rb.minimum_acceleration(*ends, body=book),
+        rb.minimum_torque(*ends, body=book),
     ]
-    efforts = [np.linalg.norm(torques(curve, G, _TIMES), axis=-1) for curve in curves]
-    costs = {name: [float(cost(c, G)) for c in curves] for name, cost in _COSTS.items()}
+    efforts = [np.linalg.norm(torques(c, book.inertia, _TIMES), axis=-1) for c in curves]
+    costs = {name: [float(cost(c, body=book)) for c in curves] for name, cost in _COSTS.items()}
     return curves, efforts, costs

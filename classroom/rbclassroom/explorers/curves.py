@@ -17,7 +17,7 @@ from rbcourse.straight_line import line_singular_value, theta
 _TIMES = np.linspace(0, 1, 101)
 _SIDE = 0.8
 _EDGES = np.array([0.20, 0.13, 0.03])  # edges of a book of half a kilogram, in m
-_MOMENTS = np.diag(rb.metrics.box_inertia(_EDGES, 0.5))
+_MOMENTS = np.diag(rb.Body.box(_EDGES, 0.5).inertia)
 _SPIN_TIMES = np.linspace(0, 8, 201)
 _OFF_MOST, _OFF_STEP = 20.0, 0.5
 _SPINS = {"axis 1": 0, "axis 2": 1, "axis 3": 2}

@@ -134,7 +134,9 @@ def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
     """Solve the problem of BK 6.3 with these three changes."""
     sigma = turn * np.pi / 6 * np.array([1, 4, 3])
     goal = rb.pose_from_coordinates([*sigma, 8, 10, 12])
-    ends = np.eye(4), goal, [1, 2, 3], [2, 1, spin], [1, 1, 1], [1, 5, rise]
+    w, d_dot = np.array([[1, 2, 3], [2, 1, spin]]), np.array([[1, 1, 1], [1, 5, rise]])
+    poses = np.stack([np.eye(4), goal])
+    ends = *poses, *rb.twist_from_rates(poses, w, d_dot)
     best = rb.minimum_acceleration(*ends)
     return _compared("projection", best, rb.projected_cubic(*ends))
 

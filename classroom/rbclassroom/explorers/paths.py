@@ -7,6 +7,7 @@ import numpy as np
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
+from rbcourse.curves.chain import Chain
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
@@ -79,10 +80,10 @@ def spline_explorer() -> Explorer:
         times, angles = np.array([0, 1, third, 4]), ANGLES.copy()
         angles[2, 1] = pitch
         R = rb.matrix_from_zyx(np.radians(angles))
-        rest = (np.zeros(3), np.zeros(3)) if ends == "at rest" else "natural"
+        conditions: Any = "rest" if ends == "at rest" else "natural"
         w = rb.bessel_velocities(times, R)
         w[[0, -1]] *= ends == "natural"
-        curves = rb.chain(times, R, w), rb.projected_spline(times, R, rest)
+        curves = rb.chain(times, R, w), rb.projected_spline(times, R, conditions)
         starts, h = times[:-1, None], np.diff(times)[:, None]
         # times on both sides of each knot
         inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()
@@ -102,7 +103,7 @@ def spline_explorer() -> Explorer:
             jumped = f"by {numbers(jumps, 2)} rad/s²" if len(jumps) else "not yet"
             said[f"{kind}: ω′ jumps"] = jumped
             costs.append(rb.acceleration_cost(curve))
-        least = rb.minimum_acceleration_spline(times, R, rest).cost
+        least = rb.minimum_acceleration_spline(times, R, conditions).cost
         for kind, cost in zip(KINDS, costs, strict=True):
             said[f"{kind}: cost"] = f"{numbers(cost / least, 3)} × the least"
         return said
@@ -170,15 +171,14 @@ def chain_explorer() -> Explorer:
     return Explorer("Through four poses", fig, artists, controls, show, plays="t", seconds=6.0)
 
 
-def _joined(curve: str, knots: rb.Array) -> rb.Chain:
+def _joined(curve: str, knots: rb.Array) -> Chain:
     if curve == JOINED[0]:
         return rb.chain(knots, POSES, leg=rb.geodesic)
     if curve == JOINED[1]:
         w = rb.bessel_velocities(knots, POSES) * [[0], [1], [1], [0]]
         return rb.chain(knots, POSES, w)
-    rest = np.zeros(6), np.zeros(6)
     spline = rb.projected_spline if curve == JOINED[2] else rb.minimum_acceleration_spline
-    return spline(knots, POSES, rest)
+    return spline(knots, POSES, "rest")
 
 
 def _norms(vectors: rb.Array) -> rb.Array:

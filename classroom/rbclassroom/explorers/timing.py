@@ -11,6 +11,7 @@ from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_s
 from rbclassroom.explorers.names import new_name, put_name
 from rbclassroom.explorers.paths import EDGES, POSES
 from rbclassroom.figures.lesson15 import highest_rates
+from rbcourse.curves.timing import Timed
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, PALE
 
@@ -62,7 +63,7 @@ def timing_explorer() -> Explorer:
     }
 
     @lru_cache(maxsize=16)
-    def timed(*most: float) -> tuple[rb.Timed, float, dict[str, rb.Array]]:
+    def timed(*most: float) -> tuple[Timed, float, dict[str, rb.Array]]:
         limits: dict[str, Any] = dict(zip(LIMITS, most, strict=True))
         used = rb.limits_used(path, **limits)
         even = max(x if name.endswith("speed") else x**0.5 for name, (x, _) in used.items())

@@ -14,8 +14,9 @@ from matplotlib.patches import Circle
 from numpy.typing import ArrayLike
 
 from rbclassroom.figures import columns, name_lines, named
-from rbcourse import Array, orthonormalize_gram_schmidt, project_so
+from rbcourse import Array
 from rbcourse.draw.save import COLOURS, PALE, Table
+from rbcourse.projection import orthonormalize_gram_schmidt, project_so
 
 Repair = Callable[[Array], Array]
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbclassroom.figures import columns
-from rbcourse import Array, Curve, Ends, angle_between, exp_so3, geodesic, sample_rotation
+from rbcourse import Array, Curve, angle_between, exp_so3, geodesic, sample_rotation
 from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 from rbcourse.sampling import Rng
@@ -38,8 +38,8 @@ def moving_casteljau(
 
     The first axes show the construction in the plane, with the four control `points`, shape (4, 2).
     The second axes, in space, show the construction on SO(3). Its control points are those of
-    `closed_forms.bezier` for the `ends` R0, R1, w0, w1. Each rotation is shown as the image of v on the unit
-    sphere; choose v such that all images are in front.
+    `closed_forms.bezier` for the `ends` R0, R1, w0, w1. Each rotation is shown as the image of v on
+    the unit sphere; choose v such that all images are in front.
 
     ``update(i)`` divides all legs at the fraction t[i] and joins the new points by legs, until a
     single point is left. This point draws the curve. The function returns the artists that move: a
@@ -96,7 +96,7 @@ def describe_casteljau(ends: Sequence[ArrayLike]) -> str:
 
 
 def _controls(ends: Sequence[ArrayLike]) -> Array:
-    R0, R1, w0, w1 = Ends(*ends)
+    R0, R1, w0, w1 = (np.asarray(x, float) for x in ends)
     return np.stack([R0, R0 @ exp_so3(w0 / 3), R1 @ exp_so3(-w1 / 3), R1])
 
 
@@ -127,7 +127,9 @@ def _on_geodesic(first: Array, last: Array, t: Array) -> Array:
     return geodesic(first, last).at_own_times(np.tile(t[:, None], first.shape[1]))
 
 
-def defects(make: Callable[..., Curve], ends: Ends, *, rng: Rng = None) -> dict[str, float]:
+def defects(
+    make: Callable[..., Curve], ends: tuple[Array, Array, Array, Array], *, rng: Rng = None
+) -> dict[str, float]:
     """Return how far curves are from being invariant when their ends are moved or exchanged.
 
     The values are the largest angles in rad over all problems at 33 values of t, for random

@@ -9,7 +9,9 @@ from matplotlib.figure import Figure
 
 from rbclassroom.figures import columns, name_ends, name_lines, vectors
 from rbclassroom.figures.lesson12 import groups, heat_map, label_maps, shares
-from rbcourse import Array, Curve, geodesic_flow, log_so3, normal_cubic_so3
+from rbcourse import Array, Body, Curve, log_so3
+from rbcourse.closed_forms import normal_cubic
+from rbcourse.connection import geodesic_flow
 from rbcourse.draw.save import COLOURS, Table
 
 LOOKS: dict[str, dict[str, Any]] = {
@@ -96,8 +98,8 @@ def normal_table(t: Array, w: Array, inertia: Array) -> dict[str, Array]:
     `closed_forms.normal_cubic`.
     """
     R, _ = geodesic_flow(inertia, np.eye(3), w, t)
-    rest = np.zeros(3)
-    normal = normal_cubic_so3(np.eye(3), R, rest, rest, inertia).controls[..., 1, :]
+    cubics: Any = normal_cubic(np.eye(3), R, body=Body(inertia))
+    normal = cubics.controls[..., 1, :]
     line = np.multiply.outer(t, w)
     kinds = dict(zip(("straight", *_COORDINATES), (line, log_so3(R), normal), strict=True))
     found = {f"{kind} {k + 1}": x[:, k] for kind, x in kinds.items() for k in range(len(w))}

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -41,7 +41,7 @@ _TURNS: list[dict[str, Any]] = [
 ]
 
 
-def profile_table(motion: Curve, order: int, samples: int = 401) -> Table:
+def profile_table(motion: Curve, order: Literal[1, 2], samples: int = 401) -> Table:
     """Return the speeds (order 1) or the accelerations (order 2) of a motion over time.
 
     They are the norms of the two halves of ``motion(t, order)``, at equally spaced times in s.
@@ -158,14 +158,15 @@ def excess_table(degrees: Sequence[float], paths: int, rng: int) -> Table:
         for turns in rb.exp_so3(np.radians(degree) * axes):
             R = np.array(list(accumulate(turns, np.matmul, initial=np.eye(3))))
             w = rb.bessel_velocities(times, R)
-            ends, scipys = (w[0], w[-1]), RotationSpline(times, Rotation.from_matrix(R))
+            scipys = RotationSpline(times, Rotation.from_matrix(R))
+            ends, scipy_ends = (w[0], w[-1]), tuple(scipys([0, 9], 1))
             curves = (
                 rb.chain(times, R, w),
                 rb.projected_spline(times, R, ends),
                 rb.quaternion_spline(times, R, ends),
             )
             best, other = (
-                rb.minimum_acceleration_spline(times, R, x).cost for x in (ends, scipys([0, 9], 1))
+                rb.minimum_acceleration_spline(times, R, x).cost for x in (ends, scipy_ends)
             )
             squares = np.sum(scipys(within.ravel(), 2) ** 2, axis=-1).reshape(within.shape)
             cost = np.sum(squares @ weights)  # 2 from the metric, ½ from the length of a leg

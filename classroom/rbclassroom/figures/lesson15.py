@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from rbclassroom.figures import name_lines, named
 from rbclassroom.figures.lesson14 import profile_table
-from rbcourse import Array, Curve, Timed
+from rbcourse import Array, Curve
+from rbcourse.curves.timing import Timed
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
 LIMITS = {
@@ -114,7 +115,7 @@ def describe_phase_plane(data: Table) -> str:
 
 def share_table(motion: Curve, limits: dict[str, float]) -> Table:
     """Return the fraction of each limit that a motion uses, over time, to four decimals."""
-    rates = {order: profile_table(motion, order, 1201) for order in (1, 2)}
+    rates = {1: profile_table(motion, 1, 1201), 2: profile_table(motion, 2, 1201)}
     shares = {name: np.asarray(rates[LIMITS[name][0]][LIMITS[name][2]]) for name in limits}
     return {
         "t [s]": rates[1]["t [s]"],
