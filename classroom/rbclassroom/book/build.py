@@ -174,7 +174,8 @@ class Sources:
             write(self.extra / "code" / path.replace(".py", ".html"), page)
         shutil.copytree(self.root / "figures", self.extra / "figures")
         files = {path.name for path in (self.root / "figures").iterdir()}
-        self.shown |= {"modules": modules, "found": found, "files": files}
+        addresses = reference.addresses(modules)
+        self.shown |= {"modules": modules, "addresses": addresses, "found": found, "files": files}
 
     def put_files(self) -> None:
         """Write the pages that show files of the course, such as its glossary."""

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,10 @@ def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
 def linkcode_resolve(_domain: str, found: dict[str, str]) -> str:
     """Return the address of the page with the source code of an object."""
     name = found["fullname"].partition(".")[0]
-    file = file_of(found["module"].partition(".")[2] or "__init__")
+    home = getattr(getattr(import_module(found["module"]), name), "__module__", "")
+    if not home.startswith(("rbcourse", "rbclassroom")):  # a constant
+        home = found["module"]
+    file = file_of(home.partition(".")[2])
     return f"../code/{file.removesuffix('.py')}.html#{name}"
 
 

@@ -57,7 +57,9 @@ def file_of_test(test: str) -> str:
 
 def has_page(module: str) -> bool:
     """Tell whether a module has a page; private modules and modules for maintainers have none."""
-    return not re.search(r"\b_|^(?:figures|course|lecture|assignments|book)\b", module)
+    room, _, own = module.partition(".")
+    listed = {name for names in CONTENTS["modules"].values() for name in names.split()}
+    return module in listed or (room in CONTENTS["rooms"] and own != "" and own[0] != "_")
 
 
 def anchor(key: str) -> str:
@@ -103,12 +105,11 @@ def to_tests(tests: list[str]) -> str:
     return more if len(tests) > 1 else shown
 
 
-def to_function(name: str) -> str:
-    """Return a link to the docstring of a function, or to its code if the function is private."""
+def to_function(name: str, addresses: dict[str, str]) -> str:
+    """Return a link to the docstring of a function, or to its code if no page describes it."""
     module, _, own = name.rpartition(".")
-    to = f"package/{module}.html#{full_name(name)}"
-    if not has_page(module):
-        to = f"code/{file_of(module).removesuffix('.py')}.html#{own}"
+    code = f"code/{file_of(module).removesuffix('.py')}.html#{own}"
+    to = addresses.get(name, code)
     text = name.replace(".", ".<wbr>").replace("_", "_<wbr>")
     return link(to, f"<code>{text}</code>")
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pygments import format as formatted
 from pygments.formatters import HtmlFormatter
@@ -15,6 +15,17 @@ from pygments.token import Comment, Keyword, String, Token
 from rbclassroom.book.lessons import Figure
 from rbclassroom.book.places import CONTENTS, file_of, file_of_test, full_name, has_page
 from rbclassroom.course.ledger import Entry
+
+
+class Member(NamedTuple):
+    """A name that the page of a module describes."""
+
+    name: str
+    kind: str
+    home: str
+    """The module that defines it, within its package."""
+    address: str
+    """The full name by which users import it."""
 
 
 def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
@@ -31,18 +42,81 @@ def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def module(name: str, root: Path) -> dict[str, Any]:
-    """Return the names, the summary and the public members of a module, with constants last."""
-    tree = ast.parse((root / file_of(name)).read_text(encoding="utf-8"))
+    """Return the names, the summary and the public members of a module, with constants last.
+
+    The public members are the names in ``__all__``; without ``__all__``, the names that `rbcourse`
+    exports and the classes of their results; if there are none, all definitions.
+    """
+    tree = _parsed(name, root)
     about = (ast.get_docstring(tree) or "").partition("\n")[0]
+    defined = _public(tree)
+    homes = {each: (kind, name) for each, (kind, _) in defined.items()}
+    exported = _imported(_parsed("__init__", root)).get(name, [])
+    if listed := _listed(tree):
+        for home, names in _imported(tree).items():
+            kinds = _public(_parsed(home, root)) if listed.intersection(names) else {}
+            homes |= {each: (kinds[each][0], home) for each in names if each in listed & {*kinds}}
+        shown = listed
+    elif shown := defined.keys() & exported:
+        shown |= {result for each in shown for result in _results(defined[each][1])} & {*defined}
+    else:
+        shown = {*defined}
+    members = [
+        Member(each, kind, home, full_name(each if each in exported else f"{name}.{each}"))
+        for each, (kind, home) in homes.items()
+        if each in shown
+    ]
+    members.sort(key=lambda member: member.kind == "data")
+    return {"name": name, "full": full_name(name), "about": about, "members": members}
+
+
+def addresses(modules: dict[str, list[dict[str, Any]]]) -> dict[str, str]:
+    """Return a dict that maps members, as the ledger names them, to their places in the book."""
+    return {
+        f"{each.home}.{each.name}": f"package/{module['name']}.html#{each.address}"
+        for some in modules.values()
+        for module in some
+        for each in module["members"]
+    }
+
+
+def _parsed(module: str, root: Path) -> ast.Module:
+    return ast.parse((root / file_of(module)).read_text(encoding="utf-8"))
+
+
+def _public(tree: ast.Module) -> dict[str, tuple[str, ast.stmt]]:
+    """Return the kinds and the statements of the public definitions in a module."""
     # the constant ENGINE is JavaScript
     explained = {node for node, after in pairwise(tree.body) if isinstance(after, ast.Expr)}
-    members = [
-        (each, kind)
+    return {
+        each: (kind, node)
         for each, kind, node in _definitions(tree)
         if each[0] != "_" and (kind != "data" or (node in explained and each != "ENGINE"))
-    ]
-    members.sort(key=lambda member: member[1] == "data")
-    return {"name": name, "full": full_name(name), "about": about, "members": members}
+    }
+
+
+def _imported(tree: ast.Module) -> dict[str, list[str]]:
+    """Return the names that a module imports from each other module of `rbcourse`."""
+    found = dict[str, list[str]]()
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rbcourse."):
+            home = (node.module or "").removeprefix("rbcourse.")
+            found.setdefault(home, []).extend(alias.name for alias in node.names)
+    return found
+
+
+def _listed(tree: ast.Module) -> set[str]:
+    """Return the names in ``__all__``."""
+    for name, _, node in _definitions(tree):
+        if name == "__all__" and isinstance(node, ast.Assign):
+            return set(ast.literal_eval(node.value))
+    return set()
+
+
+def _results(node: ast.stmt) -> set[str]:
+    """Return the annotations of the results of a function, or of the methods of a class."""
+    functions = [each for each in ast.walk(node) if isinstance(each, ast.FunctionDef)]
+    return {ast.unparse(each.returns) for each in functions if each.returns}
 
 
 def _definitions(tree: ast.Module) -> Iterator[tuple[str, str, ast.stmt]]:
@@ -62,7 +136,9 @@ def shown_code(root: Path, found: dict[str, Entry]) -> list[str]:
 
     `found` has the entries of the ledger.
     """
-    names = {each["name"] for some in modules(root).values() for each in some}
+    pages = [each for some in modules(root).values() for each in some]
+    names = {each["name"] for each in pages}
+    names |= {member.home for each in pages for member in each["members"]}
     names |= {name.rpartition(".")[0] for entry in found.values() for name in entry.functions}
     tests = {file_of_test(test) for entry in found.values() for test in entry.tests}
     return sorted(tests.union(map(file_of, names)))

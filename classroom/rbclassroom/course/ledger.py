@@ -153,9 +153,9 @@ def whose(misprint: dict[str, str]) -> str:
 
 
 def _place(function: str) -> str:
-    """Return the module of a function; for `draw` and the classroom, return only the folder."""
+    """Return the module of a function; except for `curves`, return only the folder."""
     module = function.rsplit(".", 1)[0]
-    return module if module.startswith("optimum") else module.split(".")[0]
+    return module if module.startswith("curves.") else module.split(".")[0]
 
 
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

@@ -7,7 +7,6 @@ import numpy as np
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
-from rbcourse.curves.chain import Chain
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
@@ -171,7 +170,7 @@ def chain_explorer() -> Explorer:
     return Explorer("Through four poses", fig, artists, controls, show, plays="t", seconds=6.0)
 
 
-def _joined(curve: str, knots: rb.Array) -> Chain:
+def _joined(curve: str, knots: rb.Array) -> Any:
     if curve == JOINED[0]:
         return rb.chain(knots, POSES, leg=rb.geodesic)
     if curve == JOINED[1]:

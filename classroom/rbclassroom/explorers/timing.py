@@ -11,7 +11,6 @@ from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_s
 from rbclassroom.explorers.names import new_name, put_name
 from rbclassroom.explorers.paths import EDGES, POSES
 from rbclassroom.figures.lesson15 import highest_rates
-from rbcourse.curves.timing import Timed
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, PALE
 
@@ -63,7 +62,7 @@ def timing_explorer() -> Explorer:
     }
 
     @lru_cache(maxsize=16)
-    def timed(*most: float) -> tuple[Timed, float, dict[str, rb.Array]]:
+    def timed(*most: float) -> tuple[Any, float, dict[str, rb.Array]]:
         limits: dict[str, Any] = dict(zip(LIMITS, most, strict=True))
         used = rb.limits_used(path, **limits)
         even = max(x if name.endswith("speed") else x**0.5 for name, (x, _) in used.items())

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from rbclassroom.figures import name_lines, named
 from rbclassroom.figures.lesson14 import profile_table
 from rbcourse import Array, Curve
-from rbcourse.curves.timing import Timed
 from rbcourse.draw.save import COLOURS, PALE, Table, in_words
 
 LIMITS = {
@@ -72,13 +71,14 @@ def _least(a: list[Array], b: list[Array]) -> Array:
     return least
 
 
-def phase_table(timed: Timed, limits: dict[str, float], even: float) -> Table:
+def phase_table(timed: Any, limits: dict[str, float], even: float) -> Table:
     """Return a table of rates: the limit curves, a constant rate, and the fastest rate.
 
-    With the constant rate, the motion takes `even` seconds. Rates above twice the largest rate of
-    the fastest timing are replaced by NaN.
+    `timed` is a result of `rbcourse.fastest`. With the constant rate, the motion takes `even`
+    seconds. Rates above twice the largest rate of the fastest timing are replaced by NaN.
     """
-    s = np.linspace(*timed.curve.domain, 601)
+    first, last = timed.curve.domain
+    s = np.linspace(first, last, 601)
     rates = highest_rates(timed.curve, s, limits)
     rates |= {"one rate": np.full(len(s), np.ptp(s) / even)}
     rates |= {"fastest": np.interp(s, timed.s, timed.rate**2) ** 0.5}

@@ -218,7 +218,7 @@ def test_the_ledger_has_a_row_for_every_key(source):
     page = source("ledger.md")
     assert page.count('class="row"') == len(WHAT) + len(MISPRINTS)
     cells = row(page, "bk-eq-16")
-    assert "package/projected_line.html#rbcourse.straight_line.theta" in cells[2]
+    assert "package/straight_line.html#rbcourse.straight_line.theta" in cells[2]
     assert "code/tests/test_projected_line.html#" in cells[3]
     assert "lessons/06_geodesics.html#s6" in cells[4]
     assert "figures.html#lesson06_chord" in cells[5]
@@ -270,6 +270,8 @@ def test_pages_of_the_package_begin_with_a_list_of_functions(source):
     assert "| [so3](so3.rst) | " in page
     assert "```{toctree}\n:hidden:\n\nso3\nquaternion\n" in page
     assert "book.build" not in page
-    so3 = source("package/so3.rst")
-    assert '<a href="#rbcourse.so3.exp_so3"><code>exp_so3</code></a>' in so3
-    assert so3.index("autofunction:: rbcourse.so3.exp_so3\n") < so3.index(".. autodata:: ")
+    so3, forms = source("package/so3.rst"), source("package/closed_forms.rst")
+    assert '<a href="#rbcourse.exp_so3"><code>exp_so3</code></a>' in so3
+    assert ".. autofunction:: rbcourse.exp_so3\n" in so3
+    last = ".. autodata:: rbcourse.closed_forms.FORMS"
+    assert 0 < forms.index("autofunction:: rbcourse.closed_forms.bezier\n") < forms.index(last)

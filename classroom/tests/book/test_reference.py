@@ -3,24 +3,45 @@
 import ast
 import html
 import re
+from importlib import import_module
+from inspect import ismodule
 from pathlib import Path
 
+import rbcourse as rb
 from rbclassroom.book import reference
 from rbclassroom.course import ledger
 
 ROOT = Path(__file__).parents[3]
 
 
-def test_all_modules_have_pages_except_those_for_maintainers():
-    packages = ROOT / "rbcourse", ROOT / "classroom/rbclassroom"
-    paths = {path.relative_to(package) for package in packages for path in package.rglob("*.py")}
-    names = {".".join(path.with_suffix("").parts) for path in paths if path.stem[0] != "_"}
-    listed = [module["name"] for some in reference.modules(ROOT).values() for module in some]
-    assert len(listed) == len(set(listed))
-    names.add("optimum")  # this package has public functions of its own
-    apart = "assignments.", "book.", "course.", "figures.", "lecture.", "live."
-    hidden = {name for name in names if name.startswith(apart)}
-    assert set(listed) == names - hidden
+MODULES = [each for some in reference.modules(ROOT).values() for each in some]
+
+
+def test_every_public_name_is_described_once_under_the_name_that_users_import():
+    public = [each for name in dir(rb) if ismodule(each := getattr(rb, name))]
+    listed = {f"{one.__name__}.{name}" for one in public for name in getattr(one, "__all__", [])}
+    names = {each["name"] for each in MODULES}
+    assert {name.split(".")[1] for name in listed} | {"draw", "atlas"} <= {
+        name.split(".")[0] for name in names
+    }
+    found = [each.address for module in MODULES for each in module["members"]]
+    assert len(found) == len(set(found))
+    exported = {f"rbcourse.{name}" for name in rb.__all__ if name != "Array"}
+    assert exported <= set(found)
+    for address in found:
+        module, _, name = address.rpartition(".")
+        assert hasattr(import_module(module), name)
+    short = {name.rpartition(".")[2] for name in found}
+    assert {name.rpartition(".")[2] for name in listed} - short == {"Plan", "Rng"}  # annotations
+
+
+def test_classes_of_results_are_described():
+    found = {each.address for module in MODULES for each in module["members"]}
+    assert {f"rbcourse.{name}" for name in ("Curve", "Body", "optimum.Optimum")} <= found
+    assert {f"rbcourse.curves.{name}" for name in ("chain.Chain", "timing.Timed")} <= found
+
+
+def test_the_code_of_tests_with_answers_has_no_page():
     shown = set(reference.shown_code(ROOT, ledger.collect(ROOT)))
     assert {"rbcourse/so3.py", "tests/test_so3.py", "classroom/rbclassroom/atlas.py"} <= shown
     answers = "classroom/tests/assignments", "classroom/tests/browser", "classroom/tests/hostile"

@@ -223,7 +223,7 @@ def test_the_search_finds_lessons_and_functions(page):
         "geodesic": "lessons/06_geodesics.html",
         "Slerp": "lessons/06_geodesics.html",
         "BK (16)": "ledger.html",
-        "project_so": "package/projection.html#rbcourse.projection.project_so",
+        "project_so": "package/projection.html#rbcourse.project_so",
     }.items():
         page.goto((BOOK / "index.html").as_uri())
         page.get_by_role("textbox", name="Search").fill(words)

@@ -108,13 +108,13 @@ PANELS = {"as if a ball": (-5, 192), "least acceleration": (182, 379), "least to
 def turned_books(about, turn, thickness):
     """Return three curves, the inertia, and each cost divided by the least cost."""
     (axis,) = (np.array(x, float) for name, x in AXES.items() if about.startswith(name))
-    G = rb.metrics.box_inertia([0.3, 0.2, thickness / 100])
+    book = rb.Body.box([0.3, 0.2, thickness / 100])
     goal = rb.exp_so3(np.radians(turn) * axis / np.linalg.norm(axis))
-    ends = np.eye(3), goal, np.zeros(3), np.zeros(3)
-    curves = [rb.minimum_acceleration(*ends, *inertia) for inertia in ((), (G,))]
-    curves.append(rb.minimum_torque(*ends, G))
-    costs = np.array([[f(c, G) for c in curves] for f in (rb.acceleration_cost, rb.torque_cost)])
-    return curves, G, costs / costs.min(axis=1, keepdims=True)
+    curves = [rb.minimum_acceleration(np.eye(3), goal, body=body) for body in (None, book)]
+    curves.append(rb.minimum_torque(np.eye(3), goal, body=book))
+    each = rb.acceleration_cost, rb.torque_cost
+    costs = np.array([[cost(curve, body=book) for curve in curves] for cost in each])
+    return curves, book.inertia, costs / costs.min(axis=1, keepdims=True)
 
 
 @pytest.mark.source("beyond BK 3", "beyond BK 4")
@@ -300,7 +300,8 @@ def test_both_cubes_agree_with_the_package():
     for v, said, artists in sweep("cube", spin=2.0, t=0.4):
         sigma = v["turn"] * np.pi / 6 * np.array([1, 4, 3])
         A1 = rb.pose_from_coordinates([*sigma, 8, 10, 12])
-        ends = np.eye(4), A1, [1, 2, 3], [2, 1, v["spin"]], [1, 1, 1], [1, 5, v["rise"]]
+        w, d_dot = [[1, 2, 3], [2, 1, v["spin"]]], [[1, 1, 1], [1, 5, v["rise"]]]
+        ends = np.eye(4), A1, *rb.twist_from_rates([np.eye(4), A1], w, d_dot)
         curves, costs = solved(rb.minimum_acceleration, rb.projected_cubic, ends)
         assert_compared(said, curves, costs, v["t"])
         under = artists["difference name"].get_position_3d()
@@ -325,7 +326,6 @@ def test_a_motion_plays_for_its_duration_in_seconds(name, seconds):
 
 def curve_of(name, knots):
     """Return the named curve through the four poses of the explorer."""
-    rest = np.zeros((2, 6))
     if name == "geodesics":
         return rb.chain(knots, POSES, leg=rb.geodesic)
     if name == "cubics, parabolas":
@@ -333,8 +333,8 @@ def curve_of(name, knots):
         velocities[[0, -1]] = 0
         return rb.chain(knots, POSES, velocities)
     if name == "cubics, spline":
-        return rb.chain(knots, POSES)
-    return rb.minimum_acceleration_spline(knots, POSES, tuple(rest))
+        return rb.projected_spline(knots, POSES, "rest")
+    return rb.minimum_acceleration_spline(knots, POSES, "rest")
 
 
 def test_the_box_follows_the_chain():

@@ -289,7 +289,7 @@ def test_profiles_agree_with_the_motion():
     assert table["t [s]"].tolist() == [0, 1, 2, 3, 4]
     assert np.allclose(table["angular speed [rad/s]"], [0.5, 0.5, 0, 0, 0], atol=1e-14)
     assert np.allclose(table["speed [m/s]"], 2.5, atol=1e-14)
-    smooth, h = rb.chain([0, 2, 4], poses), 1e-4
+    smooth, h = rb.projected_spline([0, 2, 4], poses, "rest", rest_at=[1]), 1e-4
     for t, w, d in zip(*lesson14.profile_table(smooth, 2, 9).values(), strict=True):
         if t not in (0, 2, 4):
             before, now, after = (smooth(t + s)[:3, 3] for s in (-h, 0, h))
@@ -304,7 +304,7 @@ def test_profiles_agree_with_the_motion():
 def test_free_motions_are_straight_in_normal_coordinates_to_second_order():
     """Free motions deviate from the lines t w by O(w²) in exponential coordinates, and by O(w³) in
     normal coordinates."""
-    book, t = rb.metrics.box_inertia([0.30, 0.20, 0.03]), np.linspace(0, 1, 5)
+    book, t = rb.Body.box([0.30, 0.20, 0.03]).inertia, np.linspace(0, 1, 5)
     w = np.array([[0.8, 0.6, 1], [-0.6, 0.8, 1]])
     kinds = "exponential coordinates", "normal coordinates"
 
@@ -350,7 +350,8 @@ def test_the_turns_are_natural_splines_through_the_angles():
 def test_limit_curves_are_the_largest_admissible_rates():
     """The test tries many changes of the rate at each place."""
     poses = np.eye(4), rb.pose_from_coordinates([1, 0, 1, 2, 1, 0])
-    path = rb.minimum_acceleration(*poses, [0, 1, 0], [1, 0, 0], [1, 0, 0], [0, 2, 1])
+    twists = rb.twist_from_rates(poses, [[0, 1, 0], [1, 0, 0]], [[1, 0, 0], [0, 2, 1]])
+    path = rb.minimum_acceleration(*poses, *twists)
     limits = {"speed": 1.5, "angular_speed": 0.7, "acceleration": 2.0, "angular_acceleration": 1.0}
     s = np.linspace(0, 1, 9)
     found = lesson15.highest_rates(path, s, limits)
