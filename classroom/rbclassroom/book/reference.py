@@ -61,11 +61,12 @@ def module(name: str, root: Path) -> dict[str, Any]:
         shown |= {result for each in shown for result in _results(defined[each][1])} & {*defined}
     else:
         shown = {*defined}
-    members = [
-        Member(each, kind, home, full_name(each if each in exported else f"{name}.{each}"))
-        for each, (kind, home) in homes.items()
-        if each in shown
-    ]
+    members = []
+    for each, (kind, home) in homes.items():
+        # Sphinx finds the text of a constant only in the module that defines it
+        known = each if each in exported else f"{home if kind == 'data' else name}.{each}"
+        if each in shown:
+            members.append(Member(each, kind, home, full_name(known)))
     members.sort(key=lambda member: member.kind == "data")
     return {"name": name, "full": full_name(name), "about": about, "members": members}
 
