@@ -212,10 +212,10 @@ def deviations():
     best = times(-1, optimum())
     curves = {
         "projected_cubic": projection(),
-        "exponential_cubic_so3": exponential(),
-        "bezier_so3": bezier(),
-        "quaternion_cubic_so3": quaternion(),
-        "cayley_cubic_so3": cayley(),
+        "exponential_cubic": exponential(),
+        "bezier": bezier(),
+        "quaternion_cubic": quaternion(),
+        "cayley_cubic": cayley(),
     }
     return {way: add(curve, best) for way, curve in curves.items()}
 
@@ -223,7 +223,7 @@ def deviations():
 def forms():
     """Return the numerator of the leading excess of each closed form."""
     found = {way: energy(away) for way, away in deviations().items()}
-    return {**found, "cumulative_bezier_so3": cumulative_energy()}
+    return {**found, "cumulative_bezier": cumulative_energy()}
 
 
 def of_splines():

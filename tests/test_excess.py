@@ -10,7 +10,7 @@ import pytest
 import rbcourse as rb
 from rbclassroom.atlas import random_problems
 from rbcourse.curves.bezier import bezier_deviation, seen_from_the_middle
-from rbcourse.curves.curve import Ends
+from rbcourse.curves.ends import Ends
 
 ROOT = Path(__file__).parents[1]
 FORMS, Q, I3, I4 = exact.forms(), exact.QQ, np.eye(3), np.eye(4)
@@ -66,10 +66,10 @@ def test_the_constants_of_the_excess_near_a_geodesic_are_right():
     projection = ss * ((ss * dd + 8 * sd**2) * Q(1, 180) + (ss * ee + 24 * se**2) * Q(1, 175))
     wanted = {
         "projected_cubic": projection,
-        "quaternion_cubic_so3": projection * Q(1, 16),
-        "exponential_cubic_so3": ss * across_e * Q(1, 175),
-        "bezier_so3": ss * (across_d * Q(1, 14580) + across_e * Q(1, 14175)),
-        "cumulative_bezier_so3": across_e * Q(1, 7) + across_d * Q(47, 11340),
+        "quaternion_cubic": projection * Q(1, 16),
+        "exponential_cubic": ss * across_e * Q(1, 175),
+        "bezier": ss * (across_d * Q(1, 14580) + across_e * Q(1, 14175)),
+        "cumulative_bezier": across_e * Q(1, 7) + across_d * Q(47, 11340),
     }
     for c, bezier, along, mean in ((180, 14580, 9, 445.5), (175, 14175, 25, 1093.5)):
         assert (bezier / c, (2 + along) / 2 * bezier / c) == (81, mean)  # the ratios in the note
@@ -83,8 +83,8 @@ def test_only_projection_and_quaternions_have_an_excess_from_rest_to_rest():
     """The excess is 6401/180180 a⁴ for the projection, and a sixteenth of this for quaternions."""
     ss, projection = exact.ss, Q(6401, 180180)
     at_rest = {exact.ee: ss, exact.se: -ss, exact.dd: 0 * ss, exact.sd: 0 * ss, exact.ed: 0 * ss}
-    wanted = dict.fromkeys(("exponential_cubic_so3", "bezier_so3", "cumulative_bezier_so3"), 0)
-    wanted |= {"projected_cubic": projection, "quaternion_cubic_so3": projection / 16}
+    wanted = dict.fromkeys(("exponential_cubic", "bezier", "cumulative_bezier"), 0)
+    wanted |= {"projected_cubic": projection, "quaternion_cubic": projection / 16}
     for name, factor in wanted.items():
         found = FORMS[name].compose(list(at_rest.items())).exquo(12 * ss)
         assert found == factor * ss**2, name
@@ -98,9 +98,8 @@ def test_the_constants_of_splines_that_turn_back_are_right():
 
 def test_the_ordering_of_four_closed_forms_is_proven():
     """The proven ratios are nearly sharp: ratios 2 % larger fail for these inner products."""
-    projection, quaternion, cayley, bezier = (
-        f"{x}_so3" for x in ("projected_cubic", "quaternion_cubic", "cayley_cubic", "bezier")
-    )
+    projection, quaternion, cayley = "projected_cubic", "quaternion_cubic", "cayley_cubic"
+    bezier = "bezier"
     e, d = (Q(-2021, 10**4), Q(3024, 10**4)), (Q(5495, 10**4), Q(-24309, 10**4))  # σ = (1, 0)
     inner = (1, sum(x * x for x in e), sum(x * x for x in d), e[0], d[0], e[0] * d[0] + e[1] * d[1])
     proven = {
@@ -157,7 +156,7 @@ def test_the_deviation_in_the_package_equals_the_derived_deviation():
     pairs = itertools.combinations_with_replacement(vectors, 2)
     symbols = exact.ss, exact.se, exact.sd, exact.ee, exact.ed, exact.dd
     inner = [(s, x @ y) for s, (x, y) in zip(symbols, pairs, strict=True)]
-    theirs = [share.subs(inner) for share in exact.deviations()["bezier_so3"]]
+    theirs = [share.subs(inner) for share in exact.deviations()["bezier"]]
     for i in range(3):
         ours = sum(c[i] * u**k for k, c in enumerate(bezier_deviation(*vectors)))
         assert sum(v[i] * share for share, v in zip(theirs, vectors, strict=True)) == bump * ours
@@ -168,7 +167,7 @@ def test_the_deviation_in_the_package_equals_the_derived_deviation():
 def test_the_leading_term_of_the_excess_agrees_with_the_solver(name):
     """The relative error of the leading term falls as the square of the scale. For the cumulative
     form, it falls linearly."""
-    power, least = (2, 1.6) if name == "cumulative_bezier_so3" else (4, 3.4)
+    power, least = (2, 1.6) if name == "cumulative_bezier" else (4, 3.4)
     found, errors = [], []
     for s in (0.4, 0.2, 0.1):
         found.append(solved(name, 20, 1.0, 6, s)[1])
@@ -187,7 +186,7 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
     order."""
     sizes = np.array([0.2, 0.4])
     sigma = sizes[:, None] * [0, 0, 1.0]
-    curves = rb.closed_forms.FORMS[f"{name}_cubic_so3"](I3, rb.exp_so3(sigma), sigma, sigma)
+    curves = rb.closed_forms.FORMS[f"{name}_cubic"](I3, rb.exp_so3(sigma), sigma, sigma)
     found = rb.acceleration_cost(curves) / 2 * over / sizes**10
     assert found == pytest.approx(1, abs=0.1)
     assert abs(found[0] - 1) < 0.3 * abs(found[1] - 1)  # the relative error is of second order
@@ -196,7 +195,7 @@ def test_curves_that_leave_a_geodesic_have_a_cost_of_tenth_order(name, over):
 def test_the_excess_of_the_corrected_curve_grows_as_the_eighth_power():
     """In excesses from the solver, only the median shows the power. The estimate is accurate for
     smaller excesses, too, and shows the power for each problem."""
-    found = [solved("corrected_bezier_so3", 20, 1.0, 7, s) for s in (0.9, 0.6, 0.4)]
+    found = [solved("corrected_bezier", 20, 1.0, 7, s) for s in (0.9, 0.6, 0.4)]
     large, middle, _ = (excess for _, excess in found)
     assert 7.5 < np.median(np.log(large / middle) / np.log(1.5)) < 8.5
     _, middle, small = (rb.excess_estimate(curves) for curves, _ in found)
@@ -240,7 +239,7 @@ def test_estimates_do_not_depend_on_the_duration():
     estimate = rb.excess_estimate(curves)
     assert estimate.shape == (2, 3)
     for T in (1, 20):
-        one = rb.retime(curves[1, 2], T)
+        one = curves[1, 2].retimed(T)
         assert rb.excess_estimate(one) == pytest.approx(estimate[1, 2], rel=1e-9)
 
 

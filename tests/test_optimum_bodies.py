@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import rbcourse as rb
 from rbcourse._chebyshev import grid
 from rbcourse._hermite import hermite
-from rbcourse.curves.curve import Ends
+from rbcourse.curves.ends import Ends
 from rbcourse.optimum._collocation import relax_ball
 from rbcourse.optimum._search import ball
 
@@ -96,8 +96,8 @@ def test_no_closed_form_costs_less_than_the_optimum(best, what):
         others = [(make, [*ends, a0, a1], every) for make in quintics]
     elif what != "ball":
         real = np.linalg.eigvalsh(G) @ [1, 1, -1] > 0
-        of_bodies = (rb.weighted_cubic_so3, real), (rb.closed_forms.normal_cubic, every)
-        others += [(make, [*ends, G], those) for make, those in of_bodies]
+        for make, those in ((rb.projected_cubic, real), (rb.closed_forms.normal_cubic, every)):
+            others.append((partial(make, body=rb.Body(G[those])), ends, those))
         of_balls = COSTS[what](rb.minimum_acceleration(*ends), G)
         assert np.all(of_balls > curves.cost * (1 - 1e-9))
     t = np.linspace(0, 1, 401)
@@ -273,7 +273,7 @@ def test_turns_about_the_largest_moment_may_leave_the_axis(moments):
     """From rest to rest, a large turn about this axis is a saddle of the integral of squared
     torque."""
     exact, near, small = (
-        rb.minimum_torque(I3, rb.exp_so3(turn), REST, REST, np.diag(moments)).cost
+        rb.minimum_torque(I3, rb.exp_so3(turn), body=rb.Body(np.diag(moments))).cost
         for turn in ([0, 0, 3.1], [1e-4, 2e-4, 3.1], [0, 0, 1.0])
     )
     assert exact < 0.9 * 12 * (moments[2] * 3.1) ** 2
@@ -297,10 +297,10 @@ def is_the_same_however_rounded(make, R1, rng, count):
 def test_rounding_does_not_choose_between_two_best_curves(turn, frame):
     """The goal is a turn about the axis of the largest moment, from rest to rest. A half-turn about
     this axis carries one best curve into the other."""
-    G, axis = frame @ BOOK @ frame.T, frame[:, 2]
+    body, axis = rb.Body(frame @ BOOK @ frame.T), frame[:, 2]
     goal = rb.exp_so3(np.radians(turn) * axis)
     w = is_the_same_however_rounded(
-        lambda R1: rb.minimum_torque(I3, R1, REST, REST, G), goal, turn, 4
+        lambda R1: rb.minimum_torque(I3, R1, body=body), goal, turn, 4
     )
     assert np.abs(np.cross(w, axis)).max() > 0.1  # the curve leaves the axis
 

@@ -40,7 +40,7 @@ from rbcourse.se3 import check_path
 from rbcourse.so3 import hat, log, right_jacobian_so3, vee
 
 PathEnds: TypeAlias = (
-    Literal["natural", "rest", "periodic"] | tuple[ArrayLike | None, ArrayLike | None]
+    Literal["natural", "rest", "periodic"] | tuple[ArrayLike | None, ArrayLike | None] | Array
 )
 """The end conditions of a path: a word, or a pair of velocities."""
 
@@ -243,6 +243,8 @@ def as_ends(
             raise ValueError("rest_at: not with ends='periodic'")
         fixed[[0, -1]] |= ends == "rest"
         return Conditions(fixed, given, ends == "periodic")
+    if isinstance(ends, np.ndarray):
+        ends = tuple(np.atleast_1d(ends))
     if not isinstance(ends, tuple | list) or len(ends) != 2:
         raise ValueError(f"ends: {_ENDS} is wanted, got {ends!r}")
     for place, value in ((0, ends[0]), (-1, ends[1])):
