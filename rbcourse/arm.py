@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_single, check_all, first_index
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array
 from rbcourse.planar import Plan, interpolate, propagate
 
@@ -76,6 +77,7 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     return Posture(joints, frames)
 
 
+@described_by(arm_forward_kinematics)
 def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the matrix that maps joint velocities to the velocity of the tip in the world frame.
 
@@ -156,6 +158,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     Parameters
     ----------
     start, goal : array_like, shape (..., n)
+        Joint angles at both ends, in rad.
     steps : int, optional
         The number of equal steps, at least 1.
 
@@ -183,6 +186,7 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     Parameters
     ----------
     start : array_like, shape (..., n)
+        Joint angles at the start, in rad.
     plan : iterable of (velocity, duration)
         Pairs of n joint velocities, in rad/s, and a duration of at least 0, in s. The plan may be
         empty.

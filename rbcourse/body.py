@@ -121,14 +121,30 @@ class Body:
         return self.inertia.shape[:-2]
 
     def take(self, index: Any, batch: tuple[int, ...]) -> Body:
-        """Return the bodies that have these indices in a flattened stack of the shape `batch`."""
+        """Return the bodies of some curves of a stack.
+
+        Parameters
+        ----------
+        index : int, slice or array of int
+            A NumPy index into the flattened stack.
+        batch : tuple of int
+            The shape of the stack of curves.
+        """
         if not self.batch_shape:
             return self
         flat = np.broadcast_to(self.inertia, (*batch, 3, 3)).reshape(-1, 3, 3)
         return self._with(flat[index], self.centre)
 
     def moved(self, R: Array, d: Array) -> Body:
-        """Return the same body in a body frame that is turned by R and moved by d."""
+        """Return the same body in another body frame.
+
+        Parameters
+        ----------
+        R : ndarray, shape (3, 3)
+            The orientation of the new frame in the old one.
+        d : ndarray, shape (3,)
+            The origin of the new frame in the old one, in m.
+        """
         G = self.inertia if self.is_ball else R.T @ self.inertia @ R
         return self._with((G + G.mT) / 2, R.T @ (self.centre - d))
 

@@ -47,6 +47,7 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
+        Rotation matrices.
 
     Returns
     -------
@@ -68,6 +69,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
+        Rotation vectors, in rad.
 
     Returns
     -------
@@ -94,6 +96,7 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
+        Unit quaternions (w, x, y, z).
 
     Returns
     -------
@@ -117,6 +120,7 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
     Parameters
     ----------
     angles : array_like, shape (..., 3)
+        Angles (yaw, pitch, roll), in rad.
 
     Returns
     -------
@@ -141,6 +145,7 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
+        Rotation matrices.
 
     Returns
     -------
@@ -163,6 +168,7 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
     Parameters
     ----------
     angles : array_like, shape (..., 3)
+        Angles (yaw, pitch, roll), in rad.
 
     Returns
     -------

@@ -115,7 +115,8 @@ def read_path(file: File) -> tuple[Array, Array, Array | None]:
     Parameters
     ----------
     file : str or Path
-        As for `write_path`. In TUM, blank lines and lines that begin with # are skipped.
+        A file that `write_path` wrote, or a file in TUM format, whose name ends in ``.tum`` or
+        ``.txt``. In TUM, blank lines and lines that begin with # are skipped.
 
     Returns
     -------
@@ -177,6 +178,7 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     Parameters
     ----------
     file : str or Path
+        The file to write.
     plan : iterable of (velocity, duration)
         A planar velocity has three numbers, and joint velocities have one for each joint. Durations
         are at least 0, in s.
@@ -210,7 +212,8 @@ def load_plan(file: File, kind: str) -> Commands:
     file : str or Path
         A file of comma-separated values in UTF-8. The first line has the names of the columns.
     kind : {"world", "body", "joints"}
-        As for `save_plan`.
+        The kind of velocities: planar velocities in the world or the body frame, or joint
+        velocities.
 
     Returns
     -------

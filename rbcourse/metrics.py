@@ -53,6 +53,7 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     Parameters
     ----------
     X, Y : array_like, shape (..., n, n)
+        Tangent vectors at one point, as matrices.
 
     Returns
     -------
@@ -76,6 +77,7 @@ def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     Parameters
     ----------
     X, Y : array_like, shape (..., 3, 3)
+        Tangent vectors at one point, as matrices.
 
     Returns
     -------
@@ -97,6 +99,7 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
     Parameters
     ----------
     X, Y : array_like, shape (..., n + 1, n + 1)
+        Tangent vectors at one point, as matrices whose last rows are 0.
 
     Returns
     -------
@@ -121,6 +124,7 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     Parameters
     ----------
     X, Y : array_like, shape (..., 4, 4)
+        Tangent vectors at one point, as matrices.
 
     Returns
     -------

@@ -214,6 +214,7 @@ def interpolate_planar(
     Parameters
     ----------
     start, goal : array_like, shape (..., 3)
+        Poses (x, y, theta) at both ends, in m, m and rad.
     steps : int, optional
         The number of equal steps, at least 1.
     shortest : bool, optional
@@ -249,6 +250,7 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
     Parameters
     ----------
     start : array_like, shape (..., 3)
+        Poses (x, y, theta) at the start, in m, m and rad.
     plan : iterable of (velocity, duration)
         Velocities (vx, vy, vtheta) in m/s, m/s and rad/s, and durations of at least 0 in s.
     frame : {"world", "body"}, optional

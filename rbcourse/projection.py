@@ -103,6 +103,7 @@ def project_so(M: ArrayLike) -> Array:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
+        Any square matrices.
 
     Returns
     -------
@@ -223,6 +224,7 @@ def distance_to_so(M: ArrayLike) -> Array:
     Parameters
     ----------
     M : array_like, shape (..., n, n)
+        Any square matrices.
 
     Returns
     -------

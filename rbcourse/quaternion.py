@@ -14,6 +14,7 @@ from rbcourse._checks import (
     check_broadcast,
     first_index,
 )
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array
 from rbcourse._quaternions import canonical
 from rbcourse._taylor import multiply
@@ -128,6 +129,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     q : array_like, shape (..., 4)
         Unit quaternions.
     p : array_like, shape (..., 3)
+        Vectors.
 
     Returns
     -------
@@ -153,6 +155,7 @@ def project_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
+        Quaternions (w, x, y, z) other than 0.
 
     Returns
     -------
@@ -260,6 +263,7 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     return np.moveaxis(value, 0, -1)
 
 
+@described_by(slerp)
 def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the longer arc from the rotation q0 to the rotation q1.
 

@@ -2,6 +2,45 @@
 
 Arguments that the report does not have are keyword-only. For inputs of a wrong shape or with
 non-finite entries, a check returns False, and a correction raises ValueError.
+
+Parameters
+----------
+m : array_like, shape (n, n) or (n + 1, n + 1)
+    A square matrix, n ≥ 1; a pose has the shape (n + 1, n + 1).
+v : array_like, shape (4,)
+    A quaternion (w, x, y, z).
+epsilon : float, optional
+    The tolerance of each entry, at least 0.
+rotation : array_like, shape (3, 3) or (4,)
+    A rotation matrix or a unit quaternion (w, x, y, z), valid to 0.01.
+quaternion : bool
+    Whether to draw quaternions instead of matrices.
+naive : bool
+    Whether to draw by the naive method, which is not uniform.
+rng : Generator, int or None, optional
+    A generator, a seed, or None for fresh numbers.
+start, goal : array_like, shape (n,)
+    The joint angles at both ends, in rad; n = 2 for the arm of the report.
+start_pose : array_like, shape (3,) or (n,)
+    The planar pose (x, y, theta), in m, m and rad, or the joint angles of the arm, in rad.
+goal_pose : array_like, shape (3,)
+    The planar pose (x, y, theta) at the end, in m, m and rad.
+plan : iterable of (velocity, duration)
+    Velocities (vx, vy, vtheta) in m/s, m/s and rad/s, or n velocities of joints in rad/s, and
+    durations of at least 0, in s.
+frame : {"world", "body"}, optional
+    The frame of vx and vy; the report has "world".
+path : array_like, shape (states, 3) or (states, n)
+    Planar poses (x, y, theta), in m, m and rad, or joint angles, in rad.
+length : float, optional
+    The length of the rectangle, in m, by default a fifth of the larger extent of the path, or 1 m
+    if the body does not move.
+lengths : array_like, shape (n,), optional
+    The lengths of the links, above 0, in m.
+steps : int, optional
+    The number of equal steps, or of random rotations, at least 1.
+shortest : bool, optional
+    Whether the body turns the short way round.
 """
 
 from __future__ import annotations
@@ -15,6 +54,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import Rng, as_count, as_generator, as_single, as_tolerance, as_unit
+from rbcourse._docs import described_together
 from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
 from rbcourse.conversions import rotation_vector_from_quaternion
@@ -98,7 +138,7 @@ def check_SEn(m: ArrayLike, epsilon: float = 0.01) -> bool:
 def correct_SOn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
     """Return a copy of m if it passes `check_SOn`, otherwise the nearest rotation matrix.
 
-    m is any square matrix, which may be singular or a reflection.
+    The matrix may be singular or a reflection.
     Source: RR 1.4, RR (4), RR (5), RR Fig. 1.
 
     Examples
@@ -127,8 +167,7 @@ def correct_quaternion(v: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
 def correct_SEn(m: ArrayLike, epsilon: float = 0.01) -> NDArray[Any]:
     """Return a copy of m if it passes `check_SEn`, otherwise the nearest pose.
 
-    m has the shape (n + 1, n + 1), n ≥ 1. Its translation is kept, and its last row becomes 0, …,
-    0, 1.
+    The translation is kept, and the last row becomes 0, …, 0, 1.
     Source: RR 1.6, RR Fig. 3.
 
     Examples
@@ -145,7 +184,7 @@ def random_rotation_matrix(naive: bool, *, rng: Rng = None) -> Array:
     """Return a random rotation matrix, shape (3, 3), which is uniformly random unless `naive`.
 
     Uniform rotations are drawn by Arvo's method. If naive, the three angles are uniform, but the
-    rotation is not. `rng` is a Generator, a seed or None.
+    rotation is not.
     Source: RR 2.1.
 
     Examples
@@ -172,10 +211,9 @@ def random_quaternion(naive: bool, *, rng: Rng = None) -> Array:
 def visualize_rotation(rotation: ArrayLike, *, steps: int = 24) -> tuple[Figure, Animation]:
     """Show how a rotation moves v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0) over the sphere.
 
-    `rotation` is a rotation matrix (3, 3) or a unit quaternion (4,), valid to 0.01. The figure
-    shows the nearest rotation, which is reached in `steps` equal steps about one axis. Return the
-    figure with all images, and an animation of them. A notebook shows the animation as a player;
-    ``animation.save(path)`` writes a GIF.
+    The figure shows the nearest rotation, which is reached in `steps` equal steps about one axis.
+    Return the figure with all images, and an animation of them. A notebook shows the animation as a
+    player; ``animation.save(path)`` writes a GIF.
     Source: RR 2.2.
 
     Examples
@@ -222,8 +260,7 @@ def interpolate_rigid_body(
 ) -> Array:
     """Return a path between two planar poses; x, y and theta change linearly.
 
-    Poses are (x, y, theta), and the path has the shape (steps + 1, 3). With `shortest`, the body
-    turns the short way round.
+    The path has the shape (steps + 1, 3).
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Examples
@@ -240,9 +277,6 @@ def forward_propagate_rigid_body(
 ) -> Array:
     """Return the path of a planar body that follows a plan, shape (commands + 1, 3).
 
-    The plan is a list of (velocity, duration). A velocity is (vx, vy, vtheta) in m/s, m/s and
-    rad/s, and a duration is at least 0 in s. The velocities vx and vy are along the axes of
-    `frame`, which is "world" (as in the report) or "body".
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Examples
@@ -258,10 +292,9 @@ def forward_propagate_rigid_body(
 def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Figure, Animation]:
     """Show a path of planar poses: a rectangle at each pose, and the path of its centre.
 
-    The path has poses (x, y, theta), shape (states, 3). The `length` of the rectangle is by default
-    a fifth of the larger extent of the path, or 1 if the body does not move. Straight lines join
-    the states; to show the arc of a command in the body frame, divide the command first. Return a
-    figure of the whole path, and an animation of at most 40 frames, as `visualize_rotation` does.
+    Straight lines join the states; to show the arc of a command in the body frame, divide the
+    command first. Return a figure of the whole path, and an animation of at most 40 frames, as
+    `visualize_rotation` does.
     Source: RR 3.3, RR Fig. 6, RR Fig. 7.
 
     Examples
@@ -285,8 +318,7 @@ def visualize_path(path: ArrayLike, *, length: float | None = None) -> tuple[Fig
 def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Array:
     """Return the path on which each joint angle changes linearly from its start to its goal.
 
-    The angles have the shape (n,), with n = 2 for the arm of the report. The path has the shape
-    (steps + 1, n).
+    The path has the shape (steps + 1, n).
     Source: RR 4.1, RR (20), RR (21).
 
     Examples
@@ -301,8 +333,7 @@ def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Ar
 def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
     """Return the path of an arm that follows a plan, shape (commands + 1, n).
 
-    `start_pose` (the report's name) is an array of joint angles, shape (n,). The plan is a list of
-    (velocity, duration), with velocities of the joints in rad/s and durations of at least 0 in s.
+    `start_pose` is the report's name for the joint angles at the start.
     Source: RR 4.2, RR (22), RR (23).
 
     Examples
@@ -318,7 +349,6 @@ def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
 def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[Figure, Animation]:
     """Show a path of an arm: its links in blue, and the path of its tip as a growing red curve.
 
-    The path has joint angles, shape (states, n); `lengths` are the lengths of the n links, above 0.
     Return a figure and an animation as `visualize_path` does.
     Source: RR 4.3, RR Fig. 8, RR Fig. 9.
 
@@ -376,3 +406,6 @@ def _rotation_vector(rotation: ArrayLike) -> Array:
     if check_quaternion(rotation):
         return rotation_vector_from_quaternion(project_quaternion(rotation))
     raise ValueError("rotation: a rotation matrix (3, 3) or a unit quaternion (4,) is wanted")
+
+
+described_together(__doc__, *(globals()[name] for name in __all__))

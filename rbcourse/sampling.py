@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import Rng, as_angle, as_generator, as_size, as_within_unit
+from rbcourse._docs import described_by
 from rbcourse._numerics import BLOCK, Array, blocks, sine_gap_ratio
 from rbcourse._valid import as_rotations
 from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
@@ -121,6 +122,7 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     return _in_blocks(_arvo, (3, 3), size, rng)
 
 
+@described_by(sample_rotation)
 def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random unit quaternions; q and −q are equally likely.
 
@@ -146,6 +148,7 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
     return _in_blocks(_shoemake, (4,), size, rng)
 
 
+@described_by(sample_rotation)
 def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return R_z(α) R_y(β) R_x(γ) for angles uniform on [0, 2π); the rotations are not uniform.
 
@@ -169,6 +172,7 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
     return matrix_from_zyx(_three_angles(size, rng))
 
 
+@described_by(sample_rotation)
 def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return q_z(γ) q_y(β) q_x(α) for angles uniform on [0, 2π); the quaternions are not uniform.
 

@@ -29,6 +29,7 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
+        Rotation matrices.
     d : array_like, shape (..., 3)
         Positions in the fixed frame.
 
@@ -57,6 +58,7 @@ def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
+        Poses.
 
     Returns
     -------
@@ -92,6 +94,7 @@ def inverse_se3(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
+        Poses.
 
     Returns
     -------
@@ -142,6 +145,7 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
+        Poses.
 
     Returns
     -------
@@ -164,6 +168,7 @@ def hat_se3(S: ArrayLike) -> Array:
     Parameters
     ----------
     S : array_like, shape (..., 6)
+        Twists (ω, v).
 
     Returns
     -------
@@ -222,6 +227,7 @@ def exp_se3(S: ArrayLike) -> Array:
     Parameters
     ----------
     S : array_like, shape (..., 6)
+        Twists (ω, v), for one unit of time: ω in rad, v in m.
 
     Returns
     -------
@@ -251,6 +257,7 @@ def log_se3(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
+        Poses.
 
     Returns
     -------
@@ -276,6 +283,7 @@ def adjoint_se3(A: ArrayLike) -> Array:
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
+        Poses.
 
     Returns
     -------

@@ -39,6 +39,7 @@ def hat_so3(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
+        Vectors.
 
     Returns
     -------
@@ -62,6 +63,7 @@ def vee_so3(W: ArrayLike) -> Array:
     Parameters
     ----------
     W : array_like, shape (..., 3, 3)
+        Matrices, of which only the skew-symmetric part matters.
 
     Returns
     -------
@@ -85,6 +87,7 @@ def exp_so3(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
+        Rotation vectors, in rad.
 
     Returns
     -------
@@ -112,6 +115,7 @@ def log_so3(R: ArrayLike) -> Array:
     Parameters
     ----------
     R : array_like, shape (..., 3, 3)
+        Rotation matrices.
 
     Returns
     -------
@@ -138,6 +142,7 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     Parameters
     ----------
     R, S : array_like, shape (..., 3, 3)
+        Rotation matrices.
 
     Returns
     -------
@@ -164,6 +169,7 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
+        Rotation vectors, in rad.
 
     Returns
     -------
@@ -189,6 +195,7 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     Parameters
     ----------
     w : array_like, shape (..., 3)
+        Rotation vectors, in rad.
 
     Returns
     -------

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_angle, as_finite, as_time, check_broadcast, check_order
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, sinc
 
 __all__ = ["f", "line_singular_value", "theta"]
@@ -49,8 +50,10 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
     Parameters
     ----------
-    t, angle : array_like, shape (...)
-        The positions on the line, which may be any real numbers, and the angle ‖ω₀‖ in [0, π].
+    t : array_like, shape (...)
+        The positions on the line, which may be any real numbers.
+    angle : array_like, shape (...)
+        The angle ‖ω₀‖ in [0, π].
     order : {0, 1, 2, 3}, optional
         The order of the derivative with respect to t.
 
@@ -74,6 +77,7 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     return theta_bend(t, angle, s) if order == 2 else theta_third(t, angle, s)
 
 
+@described_by(theta)
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return the position f(t) for which the projection has constant speed, or a derivative.
 

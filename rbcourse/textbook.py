@@ -2,8 +2,48 @@
 
 Read them first. Each function has the name, units, frames and singular set of its fast counterpart.
 The textbook and the fast version agree up to rounding or, for an optimum, up to a tolerance.
-Arguments are not checked. R0 and R1 have the shape (3, 3), and w0 and w1 the shape (3,). The times
-t have the shape (N,); R has the shape (N, 3, 3), and w and w' the shape (N, 3).
+Arguments are not checked. The results R have the shape (N, 3, 3), and w and w' the shape (N, 3).
+
+Parameters
+----------
+R0, R1 : ndarray, shape (3, 3)
+    The rotations at both ends.
+w0, w1 : ndarray, shape (3,)
+    The angular velocities at both ends in the body frame, in rad per unit time.
+G : ndarray, shape (3, 3)
+    The inertia of the body about its centre of mass.
+times : ndarray, shape (N,)
+    Increasing times, one for each rotation.
+R : ndarray, shape (N, 3, 3)
+    The rotations of the path.
+ends : (ndarray, ndarray) or None, shape (3,), optional
+    The first and the last angular velocity; by default, w' is 0 at both ends.
+x0, x1, v0, v1 : float or ndarray, all of one shape
+    The values and the derivatives at both ends.
+coefficients : ndarray, shape (degree + 1, ...)
+    The coefficients of 1, t, t², ….
+t : ndarray, shape (N,)
+    Times; those of a curve are from 0 to 1.
+order : int, optional
+    The order of the derivative.
+tol : float, optional
+    The tolerance of `solve_bvp`.
+M : ndarray, shape (..., n, n)
+    Square matrices.
+n : int
+    The number of samples.
+rng : numpy.random.Generator
+    The source of random numbers.
+turn : ndarray, shape (3,)
+    The rotation vector, in rad.
+inertia : ndarray, shape (3, 3)
+    The inertia of the body.
+torque : float
+    The largest norm of the torque.
+cells : int
+    The number of cells.
+function : callable
+    A function with a docstring.
 """
 
 import ast
@@ -14,6 +54,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbcourse._docs import described_together
 from rbcourse.curves.bezier import corrected_bezier
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
@@ -132,8 +173,7 @@ def cubic_coefficients(x0: Array, x1: Array, v0: Array, v1: Array) -> Array:
 def polynomial(coefficients: Array, t: Array, order: int = 0) -> Array:
     """Evaluate a polynomial or, if order > 0, its derivative of this order at the times t.
 
-    The coefficients, shape (degree + 1, ...), are those of 1, t, t², …; t broadcasts with each
-    coefficient.
+    The times broadcast with each coefficient.
 
     Examples
     --------
@@ -420,3 +460,6 @@ def fastest(turn: Array, inertia: Array, torque: float, cells: int) -> tuple[Arr
         x[0, i + 1], x[1, cells - 1 - i] = larger(x[0, i]), larger(x[1, cells - i])
     rate = np.sqrt(x.min(axis=0))
     return s, np.append(0, np.cumsum(2 * h / (rate[1:] + rate[:-1])))
+
+
+described_together(__doc__, *(globals()[name] for name in __all__))

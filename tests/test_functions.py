@@ -2,15 +2,18 @@
 
 import importlib
 import inspect
+import json
 import pkgutil
 import re
 from copy import deepcopy
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rbcourse as rb
 
+ROOT = Path(__file__).parents[1]
 ENTRY = re.compile(r"^(\w+(?:, \w+)*) : array_like, shape \(([^()]*)\)(, optional)?$", re.MULTILINE)
 RESULT = re.compile(r"^Returns\n-+\nndarray(?: of bool)?, shape \(([^()]*)\)$", re.MULTILINE)
 SIZES = {"n": 3, "m": 3, "n + 1": 4, "steps + 1": 11}
@@ -38,8 +41,10 @@ def arrays_of(function):
 def takes_arrays_alone(function):
     parameters = inspect.signature(function).parameters.values()
     needed = {one.name for one in parameters if one.default is one.empty}
-    found = arrays_of(function)
-    return bool(needed) and set(found) == needed and RESULT.search(inspect.getdoc(function))
+    found, doc = arrays_of(function), inspect.getdoc(function)
+    if any("n" in shape for _, shape, optional in ENTRY.findall(doc) if optional):
+        return False  # the default has another n
+    return bool(needed) and set(found) == needed and RESULT.search(doc)
 
 
 FUNCTIONS = {name: one for name, one in exported().items() if takes_arrays_alone(one)}
@@ -122,19 +127,78 @@ def test_errors_name_the_bad_argument(function):
                 function(**given | {name: one})
 
 
+def sections_of(docstring):
+    """Return the sections of a docstring by their headings."""
+    parts = re.split(r"^(\w.*)\n-{3,}\n", docstring + "\n", flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def described(docstring):
+    """Yield the name, the type and the description of each parameter."""
+    text = sections_of(docstring).get("Parameters", "")
+    for head, lines in re.findall(r"^(\S.*)\n((?:(?: +.*)?\n)*)", text, re.MULTILINE):
+        names, _, kind = head.partition(" : ")
+        yield from ((name.strip(" *"), kind, lines.strip()) for name in names.split(","))
+
+
+def public():
+    """Return the functions of public modules, and the methods of `Curve` and `Body`, by name."""
+    modules = [rb, *(importlib.import_module(f"rbcourse.{name}") for name in sorted(rb._MODULES))]
+    found = {f"{m.__name__}.{name}": getattr(m, name) for m in modules for name in m.__all__}
+    for kind in (rb.Curve, rb.Body):
+        methods = [name for name in vars(kind) if name[0] != "_" or name == "__call__"]
+        found |= {f"{kind.__name__}.{name}": getattr(kind, name) for name in methods}
+    functions = {
+        name: one for name, one in found.items() if inspect.isfunction(one) or inspect.ismethod(one)
+    }
+    return functions | {"rbcourse.Body": rb.Body}
+
+
+PUBLIC = public()
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_help_describes_each_parameter(name):
+    """An entry has the type or the shape. No entry refers the reader to another function."""
+    function = PUBLIC[name]
+    text = inspect.getdoc(function)
+    given = list(described(text))
+    wanted = [one for one in inspect.signature(function).parameters if one != "self"]
+    assert sorted(one for one, *_ in given) == sorted(wanted)
+    assert [one for one, kind, lines in given if not kind or not lines] == []
+    assert "As for" not in text
+
+
 @pytest.mark.parametrize("name", exported())
-def test_parameters_and_results_are_documented(name):
+def test_results_and_examples_are_documented(name):
     function = exported()[name]
-    sections = re.split(r"^(\w.*)\n-{3,}\n", inspect.getdoc(function), flags=re.MULTILINE)
-    text = dict(zip(sections[1::2], sections[2::2], strict=True))
-    documented = re.findall(
-        r"^\**(\w+(?:, \w+)*)(?: :|$)", text.get("Parameters", ""), re.MULTILINE
-    )
-    wanted = set(inspect.signature(function).parameters)
-    assert wanted == {one for names in documented for one in names.split(", ")}
-    assert "Returns" in text or inspect.signature(function).return_annotation == "None"
+    sections = sections_of(inspect.getdoc(function))
+    assert "Returns" in sections or inspect.signature(function).return_annotation == "None"
     # all four functions share one example
-    assert "Examples" in text or function.__module__ == "rbcourse.files"
+    assert "Examples" in sections or function.__module__ == "rbcourse.files"
+
+
+def test_the_package_exports_few_names():
+    """The group decides for most functions; names of a group have a suffix if its field has it."""
+    assert len(rb.__all__) <= 64
+    usual = r"(hat|vee|exp|log|right_jacobian|right_jacobian_inverse|adjoint|inverse)_s[oe]3"
+    suffixed = [name for name in rb.__all__ if re.fullmatch(r".*_s[oe]3", name)]
+    assert len([name for name in suffixed if not re.fullmatch(usual, name)]) <= 8
+
+
+def lines_for_users():
+    """Yield the README and the code and the text of all lessons and problem sets."""
+    yield (ROOT / "README.md").read_text("utf-8")
+    for path in sorted((ROOT / "notebooks").rglob("*.ipynb")):
+        cells = json.loads(path.read_text("utf-8"))["cells"]
+        yield from ("".join(cell["source"]) for cell in cells)
+
+
+def test_the_readme_a_lesson_or_a_problem_set_uses_each_exported_name():
+    text = "\n".join(lines_for_users())
+    annotations = {"Array", "Limits"}
+    used = {name for name in rb.__all__ if re.search(rf"\b{name}\b", text)}
+    assert sorted(set(rb.__all__) - used - annotations) == []
 
 
 def test_most_exported_functions_are_tested_here():

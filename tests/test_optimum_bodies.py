@@ -299,9 +299,7 @@ def test_rounding_does_not_choose_between_two_best_curves(turn, frame):
     this axis carries one best curve into the other."""
     body, axis = rb.Body(frame @ BOOK @ frame.T), frame[:, 2]
     goal = rb.exp_so3(np.radians(turn) * axis)
-    w = is_the_same_however_rounded(
-        lambda R1: rb.minimum_torque(I3, R1, body=body), goal, turn, 4
-    )
+    w = is_the_same_however_rounded(lambda R1: rb.minimum_torque(I3, R1, body=body), goal, turn, 4)
     assert np.abs(np.cross(w, axis)).max() > 0.1  # the curve leaves the axis
 
 

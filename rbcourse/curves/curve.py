@@ -200,6 +200,15 @@ class Curve:
         """Return derivatives of curve number i of the flat stack at one time from 0 to 1.
 
         Subclasses replace this by a method without the overhead of stacks.
+
+        Parameters
+        ----------
+        i : int
+            The index of the curve in the flattened stack.
+        t : float
+            The time, as a fraction of the duration.
+        orders : tuple of int
+            The orders of the derivatives with respect to this time.
         """
         flat, time = self.flat if self.count == 1 else self.flat.take([i]), np.array([[t]])
         try:
@@ -211,6 +220,11 @@ class Curve:
         """Return the derivative of ``c(t, 1)``.
 
         On SO(3), it is ``c(t, 2)``. On SE(3), it is (w', v') with v' = Rᵀ d'' − w × v.
+
+        Parameters
+        ----------
+        t : array_like, shape t.shape
+            Times in the domain.
 
         Examples
         --------
@@ -228,8 +242,15 @@ class Curve:
     def at_own_times(self, t: ArrayLike, order: Order = 0) -> Array:
         """Evaluate each curve of the stack, or a derivative, at its own times.
 
-        `t` has the shape (...) + batch_shape. The result has the shape t.shape + (3, 3) or t.shape
-        + (3,); on SE(3), t.shape + (4, 4) or t.shape + (6,).
+        The result has the shape t.shape + (3, 3) or t.shape + (3,); on SE(3), t.shape + (4, 4) or
+        t.shape + (6,).
+
+        Parameters
+        ----------
+        t : array_like, shape (...) + batch_shape
+            Times in the domains of the curves.
+        order : {0, 1, 2, 3}, optional
+            The order of the derivative; on SE(3), at most 2.
         """
         times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
@@ -344,7 +365,14 @@ class Curve:
         return ""
 
     def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these indices in the flattened stack."""
+        """Return the stack of the curves with these indices in the flattened stack.
+
+        Parameters
+        ----------
+        index : int, slice or array of int
+            A NumPy index into an axis with all curves. An array of indices, of any shape, gives a
+            stack of this shape.
+        """
         parts = {field.name: getattr(self, field.name) for field in fields(self)}
         stacked = len(self.batch_shape)
         for name, value in parts.items():
@@ -358,20 +386,41 @@ class Curve:
         return type(self)(**parts)
 
     def lasting(self, duration: Array) -> Self:
-        """Return the same curves with other durations."""
+        """Return the same curves with other durations, without the checks of `retimed`.
+
+        Parameters
+        ----------
+        duration : ndarray, shape batch_shape
+            The new durations.
+        """
         return replace(self, duration=duration)
 
     def values(self, t: Array, order: int) -> Array:
         """Return all curves of a flat stack, or a derivative, at times from 0 to 1.
 
-        Subclasses implement this method. `t` has the shape (T, count) or (T, 1). The result has the
-        shape (T, count, 3, 3) or (T, count, 3); on SE(3), (T, count, 4, 4) or (T, count, 6).
-        SingularTime is raised if a curve is not defined at one of the times.
+        Subclasses implement this method. The result has the shape (T, count, 3, 3) or (T, count,
+        3); on SE(3), (T, count, 4, 4) or (T, count, 6). SingularTime is raised if a curve is not
+        defined at one of the times.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T, count) or (T, 1)
+            Times as fractions of the durations.
+        order : int
+            The order of the derivative with respect to these times.
         """
         raise NotImplementedError
 
     def evaluate(self, t: Array, order: int) -> Array:
-        """Return all curves, or a derivative, at the times t, shape (T, count) or (T, 1)."""
+        """Return all curves of the flattened stack, or a derivative, without checks.
+
+        Parameters
+        ----------
+        t : ndarray, shape (T, count) or (T, 1)
+            Times in the domains of the curves.
+        order : int
+            The order of the derivative.
+        """
         T, core = self.flat.duration, self._core(order)
         shares = t / (T[:1] if np.all(T[:1] == T) else T)
         values = np.empty((len(t), self.count, *core))

@@ -64,7 +64,7 @@ def fastest(
     rates : (float, float), optional
         The values of s' at both ends: 0 is rest, and 1 is the velocity of the path itself. A rate
         has no effect at an end where the curve rests.
-    **limits
+    **limits : Limits
         At least one limit on an acceleration, the torque or the force is required.
 
         angular_speed, speed : float or array_like, shape (3,)

@@ -103,9 +103,31 @@ def save_animation(
 ) -> Animation:
     """Save an animation as GIF, its still frame as PNG, and its numbers as CSV.
 
-    The files go to the folder of `save_figure`. The same input always gives the same bytes. Without
-    `gif`, only a notebook shows the animation. With `pdf`, the still frame is also saved as PDF.
-    The figure is closed.
+    The files go to the folder of `save_figure`. The same input always gives the same bytes. The
+    figure is closed.
+
+    Parameters
+    ----------
+    fig : matplotlib Figure
+        The figure.
+    name : str
+        The name of the files without the extension: a word of letters, digits and _.
+    data : dict of array_like, all of one shape
+        The plotted numbers. The names of the columns end with a unit, such as ``"t [s]"``.
+    alt : str
+        The description of the figure, for readers who do not see it.
+    update : callable
+        ``update(i)`` moves the artists to frame i, and returns the artists that move.
+    frames : int
+        The number of frames, at most 50 per second.
+    seconds : float, optional
+        The duration of the animation, in s.
+    still : int, optional
+        The number of the frame that the PNG shows, by default the last one.
+    gif : bool, optional
+        Whether to save a GIF; without it, only a notebook shows the animation.
+    pdf : bool, optional
+        Whether to save the still frame also as PDF, for printing.
     """
     table = csv_text(data)
     animation = animate(fig, name, alt, update, frames, seconds, still, gif)

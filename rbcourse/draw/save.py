@@ -107,7 +107,20 @@ def save_figure(
     environment variable ``RBCOURSE_FIGURES`` names the folder of the files; the default is
     ``figures`` in the current folder. If the variable is empty, no files are written. The same
     input always gives the same bytes. With 256 colours, the PNG is a third as large, without a
-    visible difference. With `pdf`, the figure is also saved as PDF, for printing.
+    visible difference.
+
+    Parameters
+    ----------
+    fig : matplotlib Figure
+        The figure.
+    name : str
+        The name of the files without the extension.
+    data : dict of array_like, all of one shape
+        The plotted numbers. The names of the columns end with a unit, such as ``"t [s]"``.
+    alt : str
+        The description of the figure, for readers who do not see it.
+    pdf : bool, optional
+        Whether to save the figure also as PDF, for printing.
     """
     table, content = csv_text(data), io.BytesIO()
     if fig.get_layout_engine() is None:  # savefig would leave the figure with that of the style
@@ -131,7 +144,15 @@ def _turning(fig: Figure, name: str, alt: str, text: str) -> Player:
 
 
 def save_table(name: str, data: Table) -> None:
-    """Save numbers as a CSV file in the folder of `save_figure`."""
+    """Save numbers as a CSV file in the folder of `save_figure`.
+
+    Parameters
+    ----------
+    name : str
+        The name of the file without the extension.
+    data : dict of array_like, all of one shape
+        The numbers. The names of the columns end with a unit, such as ``"t [s]"``.
+    """
     table = csv_text(data)
     if folder := figures_folder():
         replace_file(folder / f"{name}.csv", table.encode())
@@ -190,6 +211,11 @@ def csv_text(data: Table) -> str:
 def named_tables(tables: Mapping[str, Table]) -> dict[str, ArrayLike]:
     """Return tables joined into one; each column name begins with the name of its table.
 
+    Parameters
+    ----------
+    tables : dict of dict of array_like
+        Tables by name, as for `save_table`.
+
     Examples
     --------
     >>> named_tables({"there": {"x [m]": [0, 1]}, "back": {"x [m]": [1, 0]}})
@@ -200,6 +226,13 @@ def named_tables(tables: Mapping[str, Table]) -> dict[str, ArrayLike]:
 
 def described(sentence: str, data: Table) -> str:
     """Return the description of curves: a sentence, and the range of each column after the first.
+
+    Parameters
+    ----------
+    sentence : str
+        A sentence that says which curves the figure shows.
+    data : dict of array_like, shape (n,)
+        The table of the figure. Its first column is the abscissa.
 
     Examples
     --------
