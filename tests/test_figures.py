@@ -1,5 +1,7 @@
 """The committed figures: all files are present, and their numbers agree with the definitions."""
 
+from functools import partial
+
 import numpy as np
 import oracles
 import pytest
@@ -306,27 +308,27 @@ def test_a_cell_of_the_atlas_agrees_with_its_hundred_problems():
 
 
 @pytest.mark.source("beyond BK 3", "beyond BK 6", "beyond BK 7")
-@pytest.mark.parametrize("body", atlas.BODIES)
-def test_a_cell_of_the_atlas_of_bodies_agrees_with_its_problems(body):
+@pytest.mark.parametrize("name", atlas.BODIES)
+def test_a_cell_of_the_atlas_of_bodies_agrees_with_its_problems(name):
     table, cell = atlas.stored("maps"), 3 * 10 + 3  # this cell is at 63° and 3.15 rad
-    data = {name: column[table["body"] == body][cell] for name, column in table.items()}
+    data = {key: column[table["body"] == name][cell] for key, column in table.items()}
     assert [data[x] for x in list(data)[1:4]] == pytest.approx([np.radians(63), 3.15, 200])
     ends = atlas.atlas_problems(200, ["any"], rng=31).take(slice(200 * cell, 200 * cell + 200))
-    G = atlas.BODIES[body]
-    best = rb.minimum_acceleration(*ends, G).cost
+    body = atlas.BODIES[name]
+    best = rb.minimum_acceleration(*ends, body=body).cost
     makers = {
-        "weighted": lambda *few: rb.weighted_cubic_so3(*few, G),
-        "normal": lambda *few: rb.closed_forms.normal_cubic(*few, G),
+        "weighted": partial(rb.projected_cubic, body=body),
+        "normal": partial(rb.closed_forms.normal_cubic, body=body),
         "Bézier": rb.closed_forms.bezier,
-        "long way": rb.bezier_long_so3,
+        "long way": partial(rb.closed_forms.bezier, long=True),
         "projection": rb.projected_cubic,
         "ball's optimum": rb.minimum_acceleration,
     }
-    excess = {curve: atlas.costs(make, ends, G) / best - 1 for curve, make in makers.items()}
+    excess = {curve: atlas.costs(make, ends, body) / best - 1 for curve, make in makers.items()}
     excess["two Béziers"] = np.minimum(excess["Bézier"], excess.pop("long way"))
     excess["three"] = np.minimum(excess["two Béziers"], excess["normal"])
     for curve, x in excess.items():
-        stored = [data[f"{curve} {name} [1]"] for name in ("median", "90 %")]
+        stored = [data[f"{curve} {place} [1]"] for place in ("median", "90 %")]
         assert stored == pytest.approx(np.sort(x)[[99, 179]], rel=2e-3, abs=1e-6)
 
 
@@ -341,7 +343,7 @@ def test_the_intervals_cover_all_problems_of_three_seeds():
 def test_the_torques_of_lesson_13_turn_its_book_to_the_goal():
     """By Euler's equation, the stored torques take the book from rest to rest at the goal."""
     torques, poses = numbers("lesson13_torques"), numbers("lesson13_book")
-    G, t = rb.metrics.box_inertia([0.3, 0.2, 0.03]), torques["t [s]"]
+    G, t = rb.Body.box([0.3, 0.2, 0.03]).inertia, torques["t [s]"]
     diagonal = rb.exp_so3(np.radians(150) * np.ones(3) / np.sqrt(3))
 
     def euler(t, y, torque):

@@ -145,7 +145,7 @@ def test_tables_hold_the_poses_and_rates_with_units():
     wanted = {"t [1]": TIMES, "y [m]": SCREW[:, 1, 3], "R23 [1]": SCREW[:, 1, 2]}
     assert list(table)[:4] == ["t [1]", "x [m]", "y [m]", "z [m]"]
     assert all(np.array_equal(table[name], column) for name, column in wanted.items())
-    motion, t = rb.chain([0, 2], np.stack([np.eye(4), A1])), np.linspace(0, 2, 5)
+    motion, t = rb.projected_spline([0, 2], [np.eye(4), A1], "rest"), np.linspace(0, 2, 5)
     plain, timed = (bodies.motion_table(t, motion, t[:1], *unit) for unit in ((), ("s",)))
     assert [name.split(" [")[0] for name in plain] == [name.split(" [")[0] for name in timed]
     units = "t [s]", "drawn [1]", "x [m]", "w1 [rad/s]", "v3 [m/s]", "w2' [rad/s²]", "a1 [m/s²]"
