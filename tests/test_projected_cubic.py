@@ -6,16 +6,16 @@ import numpy as np
 import oracles
 import pytest
 from numpy.polynomial import Polynomial
-from scipy.spatial.transform import Rotation
-
-import rbcourse as rb
-from rbcourse._hermite import hermite
-from rbcourse.curves.curve import Ends
 from rbcourse.curves.projected_polynomial import (
     _may_almost_jump,
     bound_of_margin,
     projected_cubic,
 )
+from scipy.spatial.transform import Rotation
+
+import rbcourse as rb
+from rbcourse._hermite import hermite
+from rbcourse.curves.curve import Ends
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(62)
