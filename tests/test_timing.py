@@ -1,9 +1,7 @@
 """Check the fastest timing by formulas, other programs, limits at many times, and symmetries."""
 
-import re
 import tracemalloc
 from itertools import pairwise
-from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -477,13 +475,6 @@ REFUSED = [
 def test_bad_limits_and_paths_are_refused(curve, limits, message):
     with pytest.raises(ValueError, match=message):
         rb.fastest(curve, **limits)
-
-
-def test_the_motion_in_the_readme_starts_and_ends_at_rest():
-    text = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
-    (call,) = re.findall(r"`(rb\.fastest\(motion.*?\))`", text)
-    timed = eval(call, {"rb": rb, "motion": random_chain(1)})
-    assert np.abs(timed(timed.domain, 1)).max() < 1e-9
 
 
 def test_an_unknown_limit_is_refused():
