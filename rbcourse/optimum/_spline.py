@@ -1,16 +1,16 @@
 """Optima through many poses: Newton's method solves for all legs together.
 
-Vary a curve R(t) to R exp(η̂), with η = 0 at the poses. On each leg of an optimum, R p = c, as
-between two poses (see `rbcourse.curves.functionals`). The variation of the cost is then a sum over
-the ends of the legs. Each term is the product of the momenta and the change of the end values; for
-a ball, it is 4 w' · δw. So at an optimum the momenta are the same on both sides of each inner pose,
-and 0 at natural ends.
+On each leg R p = c, as between two poses (`_collocation`). Vary R(t) to R exp(η̂), with η = 0 at the
+poses. Then the cost changes by a sum over the legs,
 
-A Newton step linearises each leg (`_collocation`). The changes of the momenta, for unit changes of
-the end values, give a symmetric matrix for each leg. Together these matrices form the linear system
-for the values at the poses (`curves.velocities.KnotSystem`), the second derivative of the cost. If
-it is positive definite, and each leg is a strict local minimum among the curves with its ends
-(`_second_variation`), the whole spline is a strict local minimum.
+    δJ = Σ (μ · δx at the end − μ · δx at the start),    x = w (for the jerk, also w'),
+
+where μ are the momenta (`rbcourse.curves.functionals`); for a ball, μ = 4 w'. So at an optimum the
+momenta are the same on both sides of each inner pose, and 0 at natural ends. A Newton step
+linearises each leg. The changes of its momenta, for unit changes of x at its ends, are a symmetric
+matrix. Together these matrices are the second derivative of the cost, and the linear system for the
+values x at the poses (`curves.velocities.KnotSystem`). If it is positive definite, and each leg is
+a strict local minimum among the curves with its ends (`_second_variation`), so is the spline.
 """
 
 from __future__ import annotations
@@ -20,43 +20,52 @@ from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._numerics import Array, blocks, matvec
 from rbcourse.curves.functionals import BallAcceleration, Effort, Functional
-from rbcourse.curves.velocities import (
-    Conditions,
-    KnotSystem,
-)
+from rbcourse.curves.velocities import Conditions, KnotSystem
 from rbcourse.optimum._collocation import (
     EXACT,
     LONGEST_STEP,
     NODES,
     TOGETHER,
-    Arrays,
+    UNRESOLVED,
     BallStationary,
+    Change,
     Equations,
+    Errors,
     Failure,
     Solution,
     Stationary,
+    Unknowns,
     by_ends_of,
     cayley,
+    joined,
     on_nodes,
     orthogonal,
     rates_at_nodes,
-    refined,
+    take,
 )
-from rbcourse.optimum._guesses import cost_at_nodes, gauss_newton, rates_of, with_derivatives
+from rbcourse.optimum._guesses import SAME, cost_at_nodes, gauss_newton, rates_of, with_derivatives
 from rbcourse.so3 import exp_so3, log
 
-STEPS, DESCENT_STEPS = 20, 150
-LOWERED, BUMPS = 33, 8  # nodes of curves whose costs are lowered, and polynomials on each leg
+STEPS = 20  # of Newton's method; then it has failed
+SHORT = 1e-5  # rad: a result is accepted after a step shorter than this
+WORTHLESS = 1e-22  # a step is not needed if it lowers the cost by less than this share of it
+ROUNDING = 1e-26  # and this share of the terms of the system, whose momenta have rounding errors
+TOLERANCE = 1e-4  # a minimum may cost more than its start by this share
+FLAT = 1e-9  # eigenvalues below this share of the diagonal may be 0
+SHIFTS = 0.0, *(4.0**k for k in range(-3, 10))  # multiples of the diagonal that are added to it
+ON_AXIS = 1e-6  # a curve is about one axis if rotation vectors have a smaller part across it
+BEND = np.array([0.4, 0.6, 0.8])  # rad: the turn by which a curve leaves its axis in mid-leg
 DESCENTS = 1e-2, 1e-4, 1e-6
 """Shares of the cost. If Newton's method finds no minimum, Gauss–Newton steps lower the cost of its
 start until a step lowers it by less than the first share; if it fails again, the next share."""
-SHARES = 1, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001  # multiples of a step; the best one is used
-SHIFTS = 0.0, *(4.0**k for k in range(-3, 10))
-FLAT = 1e-9  # eigenvalues below this share of the diagonal may be 0
+DESCENT_STEPS = 150  # at most, for each share
+SHARES = 1, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001  # multiples of a Gauss–Newton step; the best is used
+LOWERED, BUMPS = 33, 8  # nodes of curves whose costs are lowered, and polynomials on each leg
 
 
 class Problem(NamedTuple):
@@ -74,50 +83,48 @@ class Problem(NamedTuple):
     def scale(self) -> Array:
         """The powers of `h` that scale values at both ends of the legs to unit time."""
         orders = np.arange(1, 1 + self.functional.ends // 2)
-        return np.tile(np.repeat(self.h[:, None] ** orders, 3, axis=1), 2)
+        at_one_end = np.repeat(self.h[:, None] ** orders, 3, axis=1)
+        return np.tile(at_one_end, 2)
 
     @property
     def weight(self) -> Array:
-        """The weight of each leg in the cost: the factor of ∫ ‖u‖² dt for times from 0 to 1."""
-        return np.asarray(self.functional.scale * self.h ** -(self.functional.ends + 1.0))
+        """The factors of ∫ ‖u‖² dt of the legs in the cost, for times from 0 to 1."""
+        power = self.functional.ends + 1.0
+        return np.asarray(self.functional.scale * self.h**-power)
 
     def cost(self, R: Array) -> float:
         """Return the cost of a curve."""
-        return float(np.sum(cost_at_nodes(self.functional, R) * self.weight))
+        return self.total(cost_at_nodes(self.functional, R))
+
+    def total(self, costs: ArrayLike) -> float:
+        """Return the cost from ∫ ‖u‖² dt of each leg, for times from 0 to 1."""
+        return float(np.sum(np.asarray(costs) * self.weight))
 
     def values(self, R: Array) -> Array:
         """Return w (and w') of a curve at the poses, as given at its ends."""
         rates = np.concatenate(rates_of(R, self.functional.ends // 2), axis=-1)
         rates /= self.scale[:, None, : rates.shape[-1]]
-        values = np.append(rates[:, 0], rates[-1:, -1], axis=0)
+        starts = rates[:, 0]
+        values = np.append(starts, rates[-1:, -1], axis=0)
         if self.ends.periodic:
             values[[0, -1]] = (values[0] + values[-1]) / 2
-        return np.where(self.ends.fixed[:, None], self.ends.given, values)
+        fixed = self.ends.fixed[:, None]
+        return np.where(fixed, self.ends.given, values)
 
     def equations(self, values: Array, n: int) -> Equations:
         """Return the equations R p = c of the legs, for n nodes and values at the poses."""
-        parts = self.R[:-1], self.R[1:], self.own(values)
-        if isinstance(self.functional, BallAcceleration):
-            return BallStationary(*parts, coarse=9 if n < 33 else 17)
-        return Stationary(self.functional, *parts)
+        ends = self.R[:-1], self.R[1:], self.own(values)
+        if not isinstance(self.functional, BallAcceleration):
+            return Stationary(self.functional, *ends)
+        return BallStationary(*ends, coarse=9 if n < 33 else 17)
 
     def own(self, values: Array) -> Array:
         """Return w0, w1 (and a0, a1) of the legs for times from 0 to 1, shape (N − 1, m, 3)."""
+        count = len(self.h)
         both = self.scale * np.append(values[:-1], values[1:], axis=1)
-        return both.reshape(len(both), 2, -1, 3).swapaxes(1, 2).reshape(len(both), -1, 3)
-
-    def solved(self, system: KnotSystem, shifts: Sequence[float] = SHIFTS) -> tuple[float, Array]:
-        """Return the first shift of a system for which it is positive definite, and its solution.
-
-        The shift is a multiple of the largest diagonal entries; it is added to the diagonal.
-        """
-        ends = self.ends._replace(given=np.zeros_like(self.ends.given))
-        sizes = np.abs(np.diagonal(system.A + system.D, axis1=1, axis2=2)).max(axis=0)
-        for shift in shifts:
-            more = shift * np.diag(sizes)
-            with suppress(np.linalg.LinAlgError):
-                return shift, system._replace(A=system.A + more, D=system.D + more).solve(ends)
-        raise np.linalg.LinAlgError("the system of a step is singular")
+        by_end = both.reshape(count, 2, -1, 3)
+        by_order = by_end.swapaxes(1, 2)
+        return by_order.reshape(count, -1, 3)
 
 
 class Found(NamedTuple):
@@ -137,16 +144,28 @@ def solve_spline(problem: Problem, R: Array) -> Found | Failure:
     the axis can cost less, so a second search starts from a curve off the axis.
     """
     found = _searched(problem, R, (None, *DESCENTS))
-    if isinstance(problem.functional, Effort) and (
-        isinstance(found, Failure)
-        or np.linalg.matrix_rank(log(found.R[0, 0].T @ found.R).reshape(-1, 3), rtol=1e-6) < 2
-    ):
-        t = grid(R.shape[1]).t[:, None]
-        sides = (-1.0) ** np.arange(len(R))[:, None, None] * [0.4, 0.6, 0.8]  # rad, in mid-leg
-        aside = R @ exp_so3(16 * t**2 * (1 - t) ** 2 * sides)
-        other = _searched(problem, aside, DESCENTS)
-        return other if other.cost < found.cost * (1 - 1e-9) else found
-    return found
+    if not isinstance(problem.functional, Effort):
+        return found
+    if isinstance(found, Found) and not _about_one_axis(found.R):
+        return found
+    other = _searched(problem, _off_the_axis(R), DESCENTS)
+    return other if other.cost < found.cost * (1 - SAME) else found
+
+
+def _about_one_axis(R: Array) -> bool:
+    """Tell whether a curve turns about one axis only."""
+    turns = log(R[0, 0].T @ R)
+    rank = np.linalg.matrix_rank(turns.reshape(-1, 3), rtol=ON_AXIS)
+    return bool(rank < 2)
+
+
+def _off_the_axis(R: Array) -> Array:
+    """Return a curve that leaves its axis on each leg, to the sides `BEND` and −`BEND` in turn."""
+    t = grid(R.shape[1]).t[:, None]
+    share = 16 * t**2 * (1 - t) ** 2
+    signs = (-1.0) ** np.arange(len(R))
+    sides = signs[:, None, None] * BEND
+    return R @ exp_so3(share * sides)
 
 
 def _searched(problem: Problem, R: Array, descents: Sequence[float | None]) -> Found | Failure:
@@ -163,102 +182,222 @@ def _searched(problem: Problem, R: Array, descents: Sequence[float | None]) -> F
         found: Found | Failure = Failure(np.inf, STEPS)
         with suppress(FloatingPointError, np.linalg.LinAlgError):
             found = _newton(problem, R)
-        if isinstance(found, Found) and found.shift <= FLAT and found.cost < bound * (1 + 1e-4):
+        most = bound * (1 + TOLERANCE)
+        if isinstance(found, Found) and found.shift <= FLAT and found.cost < most:
             return found
-    return found if isinstance(found, Failure) else Failure(found.legs[0].residual, STEPS)
+    if isinstance(found, Found):
+        return Failure(found.legs[0].residual, STEPS)
+    return found
+
+
+class Legs(NamedTuple):
+    """The state of Newton's method: the values at the poses, and the equations of the legs.
+
+    `tail` is the largest of the last Chebyshev coefficients, and `left` the largest error.
+    """
+
+    values: Array
+    equations: Equations
+    unknowns: Unknowns
+    errors: Errors
+    tail: float
+
+    @property
+    def left(self) -> float:
+        """The largest error."""
+        return float(self.errors.largest.max())
+
+    def stepped(self, step: Change, share: float) -> Unknowns:
+        """Return the unknowns after a share of a step, with orthogonal matrices R."""
+        shares = np.full(len(step.c), share)
+        R, k, c = self.equations.stepped(self.unknowns, step, shares)
+        return self.equations.unknowns(orthogonal(R), k, c)
+
+    def solutions(self, steps: int) -> list[Solution]:
+        """Return the solution of each leg; `steps` is the number of steps."""
+        costs = self.equations.costs(self.unknowns.k).tolist()
+        left = self.errors.largest.tolist()
+        each = zip(*self.unknowns, costs, left, strict=True)
+        return [Solution(*one, iterations=steps) for one in each]
+
+    def resolved(self, turned: float) -> bool:
+        """Tell whether there are enough nodes, after a step that turned a node by so much."""
+        return self.tail < EXACT or turned > UNRESOLVED * self.tail
 
 
 @np.errstate(over="raise", invalid="raise", divide="raise")
 def _newton(problem: Problem, R: Array) -> Found | Failure:
     """Return the result of Newton's method from a curve."""
-    values, last = problem.values(R), np.inf
-    unknowns: Arrays = R, *problem.equations(values, R.shape[1]).first(R)
+    values = problem.values(R)
+    turned = np.inf  # rad: the largest turn of a node by the last step
+    unknowns = problem.equations(values, R.shape[1]).first(R)
     for step in range(STEPS):
-        for n in NODES[NODES.index(unknowns[0].shape[1]) :]:  # more nodes if these are too few
-            legs = problem.equations(values, n)
-            if n > unknowns[0].shape[1]:
-                unknowns = refined(legs, n, unknowns)
-            left, parts = legs.errors(unknowns)
-            tail = legs.tails(unknowns).max()
-            if tail < EXACT or last > 1e3 * tail:
-                break
-        else:
-            return Failure(float(left.max()), step)
-        system, responses = _linearised(problem, legs, unknowns, parts)
-        _, change = problem.solved(system)
-        if max(left.max(), tail) < EXACT and last < 1e-5:
-            k, c, costs = legs.solution(unknowns)
-            cost = float(np.sum(costs * problem.weight))
-            # momenta that differ at the poses would let a step lower the cost
-            decrease = np.sum(system.b0 * change[:-1] + system.b1 * change[1:])
-            rounding = np.sum(values[:-1] * matvec(system.A, values[:-1]))
-            if decrease <= 1e-22 * cost + 1e-26 * rounding:
-                shift, _ = problem.solved(system, (-FLAT, FLAT, *SHIFTS[1:]))
-                each = zip(unknowns[0], k, c, costs.tolist(), left.tolist(), strict=True)
-                solutions = [Solution(*one, iterations=step) for one in each]
-                return Found(unknowns[0], values, solutions, cost, shift)
-        x = np.insert(problem.own(change).reshape(len(left), -1), 0, 1, axis=1)
-        turn, *changes = (np.einsum("i...j,ij->i...", y, x) for y in responses)
-        last = float(np.linalg.norm(turn, axis=-1).max())
-        share = LONGEST_STEP / max(LONGEST_STEP, last)
-        others = [y + share * dy for y, dy in zip(unknowns[1:], changes, strict=True)]
-        unknowns = orthogonal(cayley(share * turn) @ unknowns[0]), *others
+        legs = _on_enough_nodes(problem, values, unknowns, turned)
+        if not legs.resolved(turned):
+            return Failure(legs.left, step)
+        responses = _responses(legs)
+        system = _system(problem, legs, responses)
+        _, change = _minimum(system, problem.ends)
+        if max(legs.left, legs.tail) < EXACT and turned < SHORT:
+            solutions = legs.solutions(step)
+            cost = problem.total([one.cost for one in solutions])
+            if not _lowers(change, system, values, cost):
+                shift, _ = _minimum(system, problem.ends, (-FLAT, FLAT, *SHIFTS[1:]))
+                return Found(legs.unknowns.R, values, solutions, cost, shift)
+        of_legs = _combined(responses, problem.own(change))
+        turned = float(np.linalg.norm(of_legs.turn, axis=-1).max())
+        share = LONGEST_STEP / max(LONGEST_STEP, turned)
+        unknowns = legs.stepped(of_legs, share)
         values = values + share * change
-    return Failure(float(left.max()), STEPS)
+    return Failure(legs.left, STEPS)
 
 
-def _linearised(
-    problem: Problem, legs: Equations, unknowns: Arrays, parts: Arrays
-) -> tuple[KnotSystem, Arrays]:
-    """Return the linear system of a Newton step, and the responses of the legs' unknowns."""
-    m, count = problem.functional.ends, len(problem.h)
+def _on_enough_nodes(problem: Problem, values: Array, unknowns: Unknowns, turned: float) -> Legs:
+    """Return the legs on the fewest nodes that suffice, or else on the most nodes."""
+    n = unknowns.R.shape[1]
+    for more in NODES[NODES.index(n) :]:
+        equations = problem.equations(values, more)
+        if more > n:
+            unknowns = equations.refined(unknowns, more)
+        errors = equations.errors(unknowns)
+        tail = float(equations.tails(unknowns).max())
+        legs = Legs(values, equations, unknowns, errors, tail)
+        if legs.resolved(turned):
+            break
+    return legs
+
+
+def _responses(legs: Legs) -> Change:
+    """Return a Newton step of each leg, and its responses to unit changes of its end values."""
     made = []
-    for some in blocks(count, TOGETHER):
-        own, data = (tuple(x[some] for x in arrays) for arrays in (unknowns, parts))
-        made.append(legs.take(some).responses(own, data, by_ends=True))
-    responses = tuple(np.concatenate(x) for x in zip(*made, strict=True))
-    rates = rates_at_nodes(legs.ends, legs.bend(unknowns))[:m]
-    momenta, slopes = problem.functional.momenta(*(x[:, [0, -1]] for x in rates))
-    by, bends = primitives(unknowns[0].shape[1], m), legs.bend_by(unknowns, responses)
-    change = np.zeros((*momenta.shape, 1 + 3 * m))
-    for E, K, D in zip(by.from_ends, by.from_k, slopes, strict=False):
-        change += D @ along(K[[0, -1]], bends)
-        change[..., 1:] += by_ends_of(E[[0, -1]], D)
-    # the values of a leg are sorted by order and end in `own`, by end and order in a system
-    by_values = change[..., 1:].reshape(count, 3 * m, m // 2, 2, 3).swapaxes(2, 3)
-    factors = np.repeat([-1, 1], 3 * m // 2) * problem.weight[:, None] * problem.scale
-    H = factors[..., None] * by_values.reshape(count, 3 * m, 3 * m) * problem.scale[:, None]
-    b = -factors * (momenta + change[..., 0]).reshape(count, 3 * m)
-    n, H = 3 * m // 2, (H + H.mT) / 2
-    return KnotSystem(H[:, :n, :n], H[:, :n, n:], H[:, n:, n:], b[:, :n], b[:, n:]), responses
+    for some in blocks(len(legs.unknowns.R), TOGETHER):
+        equations = legs.equations.take(some)
+        unknowns = take(legs.unknowns, some)
+        errors = take(legs.errors, some)
+        made.append(equations.responses(unknowns, errors, by_ends=True))
+    return joined(made)
+
+
+def _combined(responses: Change, ends: Array) -> Change:
+    """Return a Newton step plus the responses to changes of the end values."""
+    count = len(ends)
+    one = np.ones((count, 1))
+    x = np.append(one, ends.reshape(count, -1), axis=1)
+    return Change(*(np.einsum("i...j,ij->i...", y, x) for y in responses))
+
+
+def _system(problem: Problem, legs: Legs, responses: Change) -> KnotSystem:
+    """Return the second derivative of the cost with respect to the values, and minus its gradient.
+
+    The gradient is that after a Newton step of each leg.
+    """
+    scale = problem.scale
+    size = scale.shape[1]
+    momenta, changes = _momenta(problem.functional, legs, responses)
+    momenta = momenta + changes[..., 0]
+    by_order = changes[..., 1:].reshape(-1, size, size // 6, 2, 3)  # as in `Problem.own`
+    by_end = by_order.swapaxes(2, 3).reshape(-1, size, size)
+    signs = np.repeat([-1, 1], size // 2)  # at the start and at the end
+    factors = signs * problem.weight[:, None] * scale
+    H = factors[..., None] * by_end * scale[:, None]
+    b = -factors * momenta.reshape(-1, size)
+    return _knot_system((H + H.mT) / 2, b)
+
+
+def _momenta(functional: Functional, legs: Legs, responses: Change) -> tuple[Array, Array]:
+    """Return the momenta at both ends of the legs, and their changes for each response."""
+    m = functional.ends
+    k = legs.unknowns.k
+    by = primitives(k.shape[1], m)
+    rates = rates_at_nodes(legs.equations.ends, k)[:m]
+    at_ends = [x[:, [0, -1]] for x in rates]
+    momenta, slopes = functional.momenta(*at_ends)
+    changes = np.zeros((*momenta.shape, 1 + 3 * m))
+    for from_ends, from_k, slope in zip(by.from_ends, by.from_k, slopes, strict=False):
+        changes += slope @ along(from_k[[0, -1]], responses.k)
+        changes[..., 1:] += by_ends_of(from_ends[[0, -1]], slope)
+    return momenta, changes
+
+
+def _knot_system(H: Array, b: Array) -> KnotSystem:
+    """Return the system of matrices and loads of the legs; the values at the start come first."""
+    m = b.shape[1] // 2
+    start = slice(m)
+    end = slice(m, None)
+    return KnotSystem(
+        A=H[:, start, start],
+        B=H[:, start, end],
+        D=H[:, end, end],
+        b0=b[:, start],
+        b1=b[:, end],
+    )
+
+
+def _minimum(
+    system: KnotSystem, ends: Conditions, shifts: Sequence[float] = SHIFTS
+) -> tuple[float, Array]:
+    """Return the first shift of a system for which it is positive definite, and its solution.
+
+    The shift is a multiple of the largest diagonal entries; it is added to the diagonal. The
+    solution is a change of the values, so it is 0 where a value is given.
+    """
+    ends = ends._replace(given=np.zeros_like(ends.given))
+    diagonals = np.diagonal(system.A + system.D, axis1=1, axis2=2)
+    sizes = np.abs(diagonals).max(axis=0)
+    for shift in shifts:
+        more = shift * np.diag(sizes)
+        shifted = system._replace(A=system.A + more, D=system.D + more)
+        with suppress(np.linalg.LinAlgError):
+            return shift, shifted.solve(ends)
+    raise np.linalg.LinAlgError("the system of a step is singular")
+
+
+def _lowers(change: Array, system: KnotSystem, values: Array, cost: float) -> bool:
+    """Tell whether a step would lower the cost, since the momenta differ at the poses."""
+    starts = values[:-1]
+    decrease = np.sum(system.b0 * change[:-1] + system.b1 * change[1:])
+    terms = np.sum(starts * matvec(system.A, starts))
+    least = WORTHLESS * cost + ROUNDING * terms
+    return bool(decrease > least)
 
 
 def _lowered(problem: Problem, R: Array, worthwhile: float) -> tuple[Array, float]:
     """Lower the cost of a curve by Gauss–Newton steps; return the curve and its cost.
 
-    The steps are those of `guesses.lowered`, but η is a cubic with any η' at the poses, plus a sum
+    The steps are those of `_guesses.lowered`, but η is a cubic with any η' at the poses, plus a sum
     of `BUMPS` polynomials t² (1 − t)² p(t), whose coefficients are eliminated leg by leg.
     """
-    h, weight, cost = problem.h[:, None], problem.weight[:, None, None], problem.cost(R)
+    cost = problem.cost(R)
     t = grid(R.shape[1]).t[:, None]
     bumps = t * (1 - t) * chebyshev(t[:, 0], BUMPS)
-    shapes = with_derivatives(t * (1 - t) * np.concatenate([1 - t, -t, bumps], axis=1), 2)
+    eta = t * (1 - t) * np.concatenate([1 - t, -t, bumps], axis=1)
+    shapes = with_derivatives(eta, 2)
     for _ in range(DESCENT_STEPS):
-        J, u = gauss_newton(problem.functional, R, shapes)
-        outer, inner = np.append(J[..., :6], u, axis=2), J[..., 6:]
-        by_outer = np.linalg.solve(inner.mT @ inner, inner.mT @ outer)
-        rest = outer - inner @ by_outer
-        E = weight * (rest.mT @ rest)
-        H, b = h[..., None] ** 2 * E[:, :6, :6], -h * E[:, :6, 6]
-        system = KnotSystem(H[:, :3, :3], H[:, :3, 3:], H[:, 3:, 3:], b[:, :3], b[:, 3:])
-        _, change = problem.solved(system)
-        x = h * np.append(change[:-1], change[1:], axis=1)
-        z = -matvec(by_outer[..., :6], x) - by_outer[..., 6]
-        eta = shapes[0] @ np.append(x, z, axis=1).reshape(len(h), -1, 3)
-        tried = [R, *(R @ cayley(share * eta) for share in SHARES)]
-        costs = [cost, *(problem.cost(one) for one in tried[1:])]
+        change = _best_change(problem, R, shapes)
+        tried = [R, *(R @ cayley(share * change) for share in SHARES)]
+        costs = [problem.cost(one) for one in tried]
         best = int(np.nanargmin(costs))
-        before, cost, R = cost, costs[best], tried[best]
+        before = cost
+        R, cost = tried[best], costs[best]
         if cost >= (1 - worthwhile) * before:
             break
     return R, cost
+
+
+def _best_change(problem: Problem, R: Array, shapes: list[Array]) -> Array:
+    """Return the η of a Gauss–Newton step at the nodes; the shapes of η are cubics and bumps."""
+    h = problem.h[:, None]
+    J, u = gauss_newton(problem.functional, R, shapes)
+    cubics = np.append(J[..., :6], u, axis=2)
+    bumps = J[..., 6:]
+    by_cubics = np.linalg.solve(bumps.mT @ bumps, bumps.mT @ cubics)
+    rest = cubics - bumps @ by_cubics
+    weight = problem.weight[:, None, None]
+    E = weight * (rest.mT @ rest)
+    H = h[..., None] ** 2 * E[:, :6, :6]
+    b = -h * E[:, :6, 6]
+    _, change = _minimum(_knot_system(H, b), problem.ends)
+    slopes = h * np.append(change[:-1], change[1:], axis=1)
+    of_bumps = -matvec(by_cubics[..., :6], slopes) - by_cubics[..., 6]
+    coefficients = np.append(slopes, of_bumps, axis=1)
+    return shapes[0] @ coefficients.reshape(len(h), -1, 3)
