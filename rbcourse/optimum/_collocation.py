@@ -16,6 +16,7 @@ the steps are short, and then on more nodes until the last Chebyshev coefficient
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple, Self, TypeAlias, TypeVar
 
 import numpy as np
@@ -514,8 +515,7 @@ def _system_across(R: Array, across: Array, ahead: Array) -> Array:
     count, n = R.shape[:2]
     left = (across[:, None] @ R).reshape(count, 2 * n, 3)
     right = (-ahead.mT[:, None] @ R).reshape(count, 2 * n, 3)
-    twice = primitives(n, 2).from_k[0]
-    products = (left @ right.mT) * twice.repeat(2, axis=0).repeat(2, axis=1)
+    products = (left @ right.mT) * _for_each_entry(n)
     system = integrals(products.reshape(count, n, -1)).reshape(count, 2 * n, 2 * n)
     np.einsum("...ii->...i", system)[...] += 1
     return system
@@ -534,6 +534,13 @@ def _across(c: Array) -> tuple[Array, Array]:
     twice = v * factor[:, None]
     across = np.eye(2, 3) - v[:, :2, None] * twice[:, None]
     return across, hat(c) @ across.mT
+
+
+@lru_cache
+def _for_each_entry(n: int) -> Array:
+    """Return the matrix of the twofold integral; each entry is repeated in a 2 × 2 block."""
+    twice = primitives(n, 2).from_k[0]
+    return np.kron(twice, np.ones((2, 2)))
 
 
 def by_ends_of(from_ends: Array, matrices: Array) -> Array:
