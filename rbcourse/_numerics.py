@@ -3,7 +3,7 @@
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,12 @@ def sine_gap_ratio(x: Array) -> Array:
     """Return (x − sin x)/x³, and 1/6 at x = 0, with an absolute error of eps/x²."""
     tiny = np.abs(x) < 1e-4  # accurate enough, since the caller multiplies by x³
     return np.where(tiny, 1 / 6, (1 - sinc(x)) / np.where(tiny, 1.0, x) ** 2)
+
+
+def solve(A: Array, b: Array) -> Array:
+    """Return the solution x of A x = b; the annotation of `numpy.linalg.solve` is less precise."""
+    x: Any = np.linalg.solve(A, b)
+    return x
 
 
 def matvec(A: Array, x: Array) -> Array:

@@ -6,16 +6,16 @@ import numpy as np
 import oracles
 import pytest
 from numpy.polynomial import Polynomial
-from rbcourse.curves.projected_polynomial import (
-    _may_almost_jump,
-    bound_of_margin,
-    projected_cubic,
-)
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 from rbcourse._hermite import hermite
-from rbcourse.curves.curve import Ends
+from rbcourse.curves.ends import Ends
+from rbcourse.curves.projected import (
+    _may_almost_jump,
+    bound_of_margin,
+    polynomial,
+)
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(62)
@@ -186,7 +186,7 @@ def test_the_margin_is_at_least_its_bound():
         (*2 * speeds * directions, False),
     ):
         ends = Ends(start, goal, w0, w1)
-        bound, margin = bound_of_margin(ends), projected_cubic(ends, np.ones(count)).margin
+        bound, margin = bound_of_margin(ends), polynomial(ends, np.ones(count)).margin
         assert (bound <= margin + 20 * EPS).all()
         assert not exact or np.abs(bound - margin)[margin > 0.01].max() < 1e-4
 
@@ -195,7 +195,7 @@ def test_the_margin_is_at_least_its_bound():
 def test_curves_with_a_small_margin_are_found_in_a_stack(miss):
     rng, count = np.random.default_rng(3), 200
     ends = Ends(*ends_with_a_jump(count, rng, miss))
-    curves = projected_cubic(ends, np.ones(count))
+    curves = polynomial(ends, np.ones(count))
     small = curves.margin < 1e-6
     assert small.all() if miss < 5e-7 else not small.all()
     assert _may_almost_jump(curves.ends)[small].all()
@@ -212,7 +212,7 @@ def test_a_stack_with_a_jump_needs_little_memory():
         stack[12_345] = one[0]
     tracemalloc.start()
     with pytest.warns(RuntimeWarning, match=r"^margin < 1e-6 of curve \[12345\]: .* t = 0\.5; "):
-        rb.projected_cubic_so3(*ends)
+        rb.projected_cubic(*ends)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 100e6

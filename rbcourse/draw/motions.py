@@ -32,7 +32,7 @@ def profiles(curve: Curve, *, body: Body | None = None, **limits: Unpack[Limits]
     body : Body, optional
         The body that moves, by default ``curve.body``. Speed and acceleration are those of its
         centre of mass.
-    **limits
+    **limits : Limits
         Limits as for `fastest`; each is drawn as a dashed line. A limit on the torque or the force
         adds a picture of it. For a limit of three numbers, the three components are drawn.
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbcourse._chebyshev import along, grid, interpolation, primitives, tails
-from rbcourse._numerics import Array, blocks, scaled
+from rbcourse._numerics import Array, blocks, scaled, solve
 from rbcourse.curves.functionals import BallAcceleration, Functional
 from rbcourse.so3 import hat, vee
 
@@ -408,7 +408,7 @@ def _solve_blocks(A: Array, B: Array, C: Array, f: Array, g: Array) -> tuple[Arr
     matrix[:, -3:, :-3] = C
     f = f.reshape(count, size, -1)
     right = np.append(f, g, axis=1)
-    both = np.linalg.solve(matrix, right)
+    both = solve(matrix, right)
     return both[:, :-3], both[:, -3:]
 
 
@@ -442,7 +442,7 @@ class BallStationary(Stationary):
         lacking = velocity(R) - by.from_ends[0] @ self.ends
         effect = along(by.from_k[0], R.mT).reshape(count, -1, 3)
         right = effect.mT @ lacking.reshape(count, -1, 1)
-        c = np.linalg.solve(effect.mT @ effect, right)
+        c = solve(effect.mT @ effect, right)
         return self.unknowns(R, lacking, c[..., 0])
 
     def unknowns(self, R: Array, k: Array, c: Array) -> Unknowns:
@@ -483,7 +483,7 @@ class BallStationary(Stationary):
         turns = integrals(R @ w)
         by_d = turns[..., :-3] + d
         by_c = turns[..., -3:]
-        dc = -np.linalg.solve(by_c[:, -1], by_d[:, -1])
+        dc = -solve(by_c[:, -1], by_d[:, -1])
         turn = by_d + by_c @ dc[:, None]
         if not by_ends:  # δk is not needed, since `unknowns` computes k
             return Change(turn, np.zeros_like(turn), dc)
@@ -506,7 +506,7 @@ def _coarse_causes(R: Array, c: Array, d: Array) -> Array:
     by_c = integrals(R @ w_by_c)
     right = across[:, None] @ np.append(d, by_c, axis=-1)
     right = right.reshape(count, 2 * n, columns + 3)
-    x = np.linalg.solve(_system_across(R, across, ahead), right)
+    x = solve(_system_across(R, across, ahead), right)
     return ahead[:, None] @ x.reshape(count, n, 2, columns + 3)
 
 
@@ -539,8 +539,7 @@ def _across(c: Array) -> tuple[Array, Array]:
 @lru_cache
 def _for_each_entry(n: int) -> Array:
     """Return the matrix of the twofold integral; each entry is repeated in a 2 × 2 block."""
-    twice = primitives(n, 2).from_k[0]
-    return np.kron(twice, np.ones((2, 2)))
+    return primitives(n, 2).from_k[0].repeat(2, axis=0).repeat(2, axis=1)
 
 
 def by_ends_of(from_ends: Array, matrices: Array) -> Array:

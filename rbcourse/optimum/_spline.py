@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._chebyshev import along, chebyshev, grid, primitives
-from rbcourse._numerics import Array, blocks, matvec
+from rbcourse._numerics import Array, blocks, matvec, solve
 from rbcourse.curves.functionals import BallAcceleration, Effort, Functional
 from rbcourse.curves.velocities import Conditions, KnotSystem
 from rbcourse.optimum._collocation import (
@@ -390,7 +390,7 @@ def _best_change(problem: Problem, R: Array, shapes: list[Array]) -> Array:
     J, u = gauss_newton(problem.functional, R, shapes)
     cubics = np.append(J[..., :6], u, axis=2)
     bumps = J[..., 6:]
-    by_cubics = np.linalg.solve(bumps.mT @ bumps, bumps.mT @ cubics)
+    by_cubics = solve(bumps.mT @ bumps, bumps.mT @ cubics)
     rest = cubics - bumps @ by_cubics
     weight = problem.weight[:, None, None]
     E = weight * (rest.mT @ rest)
