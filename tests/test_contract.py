@@ -66,12 +66,8 @@ def makers():
     found = {}
     for name, function in FUNCTIONS.items():
         has = inspect.signature(function).parameters
-        needed = [
-            option
-            for option in OPTIONS
-            if option in has and has[option].default is has[option].empty
-        ]
-        for option in [None, *(option for option in OPTIONS if option in has)]:
+        needed = {key for key in OPTIONS if key in has and has[key].default is has[key].empty}
+        for option in [None, *(key for key in OPTIONS if key in has)]:
             options = sorted({*needed, option} - {None})
             for size in {3, 4} - {REFUSED.get(name)}:
                 found["-".join([name, *options, str(size)])] = Maker(function, size, *options)
@@ -189,6 +185,7 @@ def has_the_derivatives_of_its_values(make):
         assert off(curve(t, 1)[..., 3:], (R.mT @ moving[..., :3, 3:])[..., 0]) < 1e-9
         path = slope(lambda t: curve(t)[..., :3, :3] @ curve(t, 1)[..., 3:, None])
         assert off(curve(t, 2)[..., 3:], (R.mT @ path)[..., 0]) < 1e-9
+    assert off(curve.twist_rate(t), slope(lambda t: curve(t, 1))) < 1e-9
 
 
 def is_the_stack_of_its_members(make):
@@ -366,6 +363,26 @@ def moves_with_its_ends(make):
     assert off(jet(curve.moved(L, X), t), jet(same, t)) < 1e-9
 
 
+def is_reversed_with_its_ends(make):
+    """Docstrings state which functions lack this symmetry; a timing f may lack it, too."""
+    ends, curve = sample(2, group=make.size), made(make, 2)
+    if "f" in make.options:
+        return
+    pairs = zip(make.names[::2], make.names[1::2], strict=True)
+    other = {a: b for pair in pairs for a, b in (pair, pair[::-1])}
+    back = {name: (-1) ** ORDERS[name] * ends[other[name]] for name in make.names}
+    (start, end), t = curve.domain, times(curve, 3)
+    want, found = jet(curve, t), jet(make(ends | back), start + end - t)
+    velocity = slice(make.size**2, make.size**2 + 3 * make.size - 6)
+    found[..., velocity] *= -1
+    if make.size == 3:
+        found[..., 15:] *= -1
+    text = " ".join((make.function.__doc__ or "").split())
+    one_way = "do not give the reversed curve" in text
+    one_way |= make.function is rb.closed_forms.exponential_quintic
+    assert (off(found, want) < 1e-9) != one_way
+
+
 def costs_the_same_if_it_is_moved(make):
     """The new body frame has another origin, so that the centre of the body is elsewhere in it."""
     curve = made(make, 2)
@@ -498,6 +515,9 @@ CONTRACT = {
         "room's axes": lambda start, goal, v0, v1: cubic(
             start, goal, v0, v1 + 1e-6 * start[..., 0, :]
         ),
+    },
+    is_reversed_with_its_ends: {
+        "one way": lambda start, goal, v0, v1: rb.closed_forms.cayley_cubic(start, goal, v0, v1),
     },
     costs_the_same_if_it_is_moved: {
         "centre": altered(

@@ -164,13 +164,3 @@ def test_displacements_that_turn_only_by_rounding_errors_are_translations():
         assert np.abs(screw.axis - [0, 0.6, 0.8]).max() < off
         assert screw.slide == pytest.approx(size, rel=off)
         assert np.all(screw.pitch == np.inf)
-
-
-@pytest.mark.parametrize("make", [rb.geodesic, rb.screw])
-def test_the_rate_of_the_twist_is_its_derivative(make):
-    """The rate of the twist differs from c(t, 2), which is the covariant acceleration."""
-    c, t, h = make(A0, A1, duration=2.0), np.linspace(0.1, 1.9, 7), 1e-4
-    differences = (c(t + h, 1) - c(t - h, 1)) / (2 * h)
-    assert c.twist_rate(t) == pytest.approx(differences, abs=1e-6)
-    turning = rb.geodesic(np.eye(3), rb.exp_so3([0, 0, 1.0]))
-    assert np.array_equal(turning.twist_rate(t / 2), turning(t / 2, 2))
