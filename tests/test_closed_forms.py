@@ -248,20 +248,13 @@ def test_errors_name_the_ends_that_are_outside_the_domain():
     rb.closed_forms.normal_cubic(I3, I3, body=bodies)
 
 
-@pytest.mark.parametrize("make", [*MAKERS.values(), rb.closed_forms.corrected_bezier])
-def test_three_closed_forms_are_reversible_in_time(make):
+@pytest.mark.parametrize("name", ["bezier", "corrected_bezier", "quaternion_cubic"])
+def test_closed_forms_with_fast_ends_are_reversible_in_time(name):
     """For some fast ends, the correction uses a logarithm that is not the shortest one."""
     R0, R1, w0, w1 = ends(40, 2.5)
+    make, t = getattr(rb.closed_forms, name), np.linspace(0, 1, 11)
     curve, back = make(R0, R1, w0, w1), make(R1, R0, -w1, -w0)
-    t = np.linspace(0, 1, 11)
-    if make not in (
-        rb.closed_forms.bezier,
-        rb.closed_forms.corrected_bezier,
-        rb.closed_forms.quaternion_cubic,
-    ):
-        assert np.all(np.abs(curve(t) - back(1 - t)).max(axis=(0, 2, 3)) > 1e-3)
-        return
-    worse = 1 / np.minimum(getattr(curve, "margin", np.ones(40)), 1)
+    worse = 1 / np.minimum(curve.margin, 1)
     for order in (0, 1, 2):
         others = (0, 2) if order else (0, 2, 3)
         want = (-1) ** order * curve(t, order)
