@@ -249,9 +249,15 @@ def test_the_body_of_a_curve_is_timed():
     c, limits, X = random_chain(7), dict(SETS["body"]), rb.pose_from_coordinates([1, 2, 3, 1, 2, 3])
     c = spline(c.times, c(c.times), body=limits.pop("body"))
     timed, tool = rb.fastest(c, **limits), rb.fastest(c.moved(right=X), **limits)
+    other = rb.fastest(c, body=rb.Body(G), **limits)
     assert timed.domain == rb.fastest(c, body=c.body, **limits).domain
-    assert timed.domain[1] < 0.9 * rb.fastest(c, body=rb.Body(G), **limits).domain[1]
-    assert rb.limits_used(timed, **limits) == rb.limits_used(timed, body=c.body, **limits)
+    assert timed.domain[1] < 0.9 * other.domain[1]
+    for one, body in ((timed, c.body), (other, rb.Body(G))):
+        used = rb.limits_used(one, body=body, **limits)
+        assert rb.limits_used(one, **limits) == used
+        of_tool = rb.limits_used(one.moved(right=X), **limits)
+        assert [of_tool[name][0] for name in used] == pytest.approx([x for x, _ in used.values()])
+        assert rb.fastest(one, **limits).domain == one.domain
     assert tool.domain == pytest.approx(timed.domain, rel=1e-9)
     t = np.linspace(*timed.domain, 9)
     for order, found in enumerate(timed.moved(right=X).state(t)):

@@ -23,6 +23,7 @@ from rbcourse.body import Body
 from rbcourse.curves._cells import BENDS, BLOCK, Limit, as_limits, fastest_motion
 from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve
+from rbcourse.curves.ends import as_body
 
 TIMES = 20_001  # the times at which `limits_used` evaluates a curve
 PLATEAU = 1e-6  # the share below the maximum within which `limits_used` takes the first time
@@ -124,14 +125,15 @@ def fastest(
     (3.5, array([0., 0., 1.]))
     """
     given = curve.curve if isinstance(curve, Timed) else curve
-    known = as_limits(given, body, **limits)
+    known = as_limits(curve, body, **limits)
     if all(limit.of_speed for limit in known):
         raise ValueError(f"limits: one of {', '.join(BENDS)} is needed")
     ends = as_single("rates", rates, 2)
     if ends.min() < 0:
         raise ValueError(f"rates: two numbers from 0 up are wanted, got {rates}")
     s, rate, times = fastest_motion(given, known, ends**2)
-    return Timed(duration=times[-1], body=given.body, curve=given, s=s, rate=rate, times=times)
+    moved = as_body(body, curve.body)
+    return Timed(duration=times[-1], body=moved, curve=given, s=s, rate=rate, times=times)
 
 
 @described_by(fastest)
@@ -240,8 +242,8 @@ class Timed(Curve):
         return replace(self, duration=duration, rate=self.rate / k, times=self.times * k)
 
     def _moved(self, L: Array, X: Array) -> Curve:
-        moved = self.curve._moved(L, X)
-        return replace(self, body=moved.body, curve=moved)
+        body = super()._moved(L, X).body
+        return replace(self, body=body, curve=self.curve._moved(L, X))
 
     def progress(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Return s, s' and s'' at the times t."""
