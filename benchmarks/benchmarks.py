@@ -111,11 +111,11 @@ def random_samples(n, rng, kind, form, name):
         yield "RoMa", partial(getattr(roma, name), n, dtype=torch.float64)
 
 
-def chain_of_poses(n, rng, leg):
+def chain_of_poses(n, rng, make):
     """Evaluate a chain of 1,000 poses at n increasing times; making the chain is not timed."""
     when, places = np.cumsum(rng.uniform(0.5, 1.5, 1000)), rng.normal(size=(1000, 3)).cumsum(0)
     R, t = rb.exp_so3(rng.normal(0, 0.5, (1000, 3)).cumsum(0)), np.linspace(when[0], when[-1], n)
-    motion = rb.chain(when, rb.pose_from_components(R, places), leg=leg)
+    motion = make(when, rb.pose_from_components(R, places))
     turning, path = RotationSpline(when, Rotation.from_matrix(R)), CubicSpline(when, places)
     yield OURS, lambda: motion(t)
     yield "SciPy, another curve", lambda: (turning(t).as_matrix(), path(t))
@@ -153,6 +153,7 @@ def one_optimum(n, rng, case):
 
 
 ALL, SOME = tuple(10**k for k in range(7)), (1, 1000, 10**6)
+SPLINE, LEGS = partial(rb.projected_spline, ends="rest"), partial(rb.chain, leg=rb.geodesic)
 TASKS = [  # the name of the task, the case, the numbers of items, and the function with its options
     ("nearest rotation", "noisy", ALL, nearest_rotation),
     ("geodesic at N times", "", ALL, geodesic),
@@ -162,8 +163,8 @@ TASKS = [  # the name of the task, the case, the numbers of items, and the funct
     ("random quaternions", "", ALL, random_samples, "quaternion", "quat", "random_unitquat"),
     ("closed forms at N times", "", SOME, closed_forms, 1),
     ("closed forms with derivatives", "", SOME, closed_forms, 3),
-    ("chain at N times", "projected cubics", SOME, chain_of_poses, rb.projected_cubic),
-    ("chain at N times", "geodesics", SOME, chain_of_poses, rb.geodesic),
+    ("chain at N times", "projected cubics", SOME, chain_of_poses, SPLINE),
+    ("chain at N times", "geodesics", SOME, chain_of_poses, LEGS),
     ("fastest timing", "one leg", (1,), fastest_timing),
     *(("optimum, one problem", case, (1,), one_optimum, case) for case in ENDS),
 ]
