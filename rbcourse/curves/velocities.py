@@ -243,11 +243,10 @@ def as_ends(
             raise ValueError("rest_at: not with ends='periodic'")
         fixed[[0, -1]] |= ends == "rest"
         return Conditions(fixed, given, ends == "periodic")
-    if isinstance(ends, np.ndarray):
-        ends = tuple(np.atleast_1d(ends))
-    if not isinstance(ends, tuple | list) or len(ends) != 2:
+    pair = list(np.atleast_1d(ends)) if isinstance(ends, np.ndarray) else ends
+    if not isinstance(pair, tuple | list) or len(pair) != 2:
         raise ValueError(f"ends: {_ENDS} is wanted, got {ends!r}")
-    for place, value in ((0, ends[0]), (-1, ends[1])):
+    for place, value in ((0, pair[0]), (-1, pair[1])):
         if value is not None:
             fixed[place], given[place] = True, as_single("ends", value, size)
     return Conditions(fixed, given)
