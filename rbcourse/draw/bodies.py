@@ -34,7 +34,7 @@ def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Tabl
 
     A column marks the times at which the body is drawn. The twists (w, v) and the accelerations
     (w', a), where a = Rᵀ d'', are in the body frame (BK 6.3). `unit` is the unit of time: "1", or
-    "s" for the curves of `chain` and `retime`.
+    "s" for the curves of `chain` and `Curve.retimed`.
 
     Examples
     --------

@@ -67,7 +67,7 @@ def find_anywhere(app: Any, env: Any, node: Any, content: Any) -> Any:
         (name, entry.docname)
         for name, entry in env.domains["py"].objects.items()
         if name.endswith(f".{node['reftarget']}") and ".textbook." not in name
-        if entry.objtype in ("class", "data", "exception", "function")
+        if entry.objtype in ("class", "data", "exception", "function") and not entry.aliased
     ]
     if len(found) == 1 and node["refdomain"] == "py":
         name, page = found[0]
