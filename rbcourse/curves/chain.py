@@ -1,7 +1,7 @@
 """Curves through many poses, composed of two-point curves.
 
 The velocities of the splines make the accelerations continuous (see `rbcourse.curves.velocities`).
-Optimal splines are in `rbcourse.optimum.many_poses`.
+Optimal splines are in `rbcourse.optimum`.
 """
 
 from __future__ import annotations
