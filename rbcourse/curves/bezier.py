@@ -20,7 +20,7 @@ from rbcourse._taylor import (
 )
 from rbcourse.conversions import quaternion_from_rotation_vector
 from rbcourse.curves.curve import Curve, QuaternionCurve, identity, other_way
-from rbcourse.curves.ends import Ends, Given, between
+from rbcourse.curves.ends import Ends, Given, Rate, between
 from rbcourse.curves.projected import projected_cubic
 from rbcourse.curves.rigid import moving
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
@@ -33,8 +33,8 @@ Legs = tuple[Array, Array, Array]
 def bezier(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     long: bool = False,
     duration: ArrayLike = 1.0,
@@ -88,8 +88,8 @@ def bezier(
 def cumulative_bezier(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     duration: ArrayLike = 1.0,
 ) -> Curve:
@@ -134,8 +134,8 @@ def cumulative_bezier(
 def corrected_bezier(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     duration: ArrayLike = 1.0,
 ) -> Curve:

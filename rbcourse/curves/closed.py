@@ -32,7 +32,7 @@ from rbcourse.curves.curve import (
     polynomial_jet,
     which_curve,
 )
-from rbcourse.curves.ends import Ends, Given, between
+from rbcourse.curves.ends import Ends, Given, Rate, between
 from rbcourse.curves.projected import projected_cubic, projected_quintic
 from rbcourse.curves.rigid import moving
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
@@ -43,8 +43,8 @@ from rbcourse.so3 import hat, log, right_jacobian_inverse_so3
 def exponential_cubic(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     long: bool = False,
     duration: ArrayLike = 1.0,
@@ -91,8 +91,8 @@ def exponential_cubic(
 def quaternion_cubic(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     duration: ArrayLike = 1.0,
 ) -> Curve:
@@ -149,8 +149,8 @@ def normalised_cubic(
 def cayley_cubic(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     duration: ArrayLike = 1.0,
 ) -> Curve:
@@ -199,8 +199,8 @@ def cayley_cubic(
 def normal_cubic(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     body: Body,
     duration: ArrayLike = 1.0,
@@ -269,10 +269,10 @@ def normal_cubic(
 def exponential_quintic(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
-    a0: ArrayLike | None = None,
-    a1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
+    a0: Rate = None,
+    a1: Rate = None,
     *,
     duration: ArrayLike = 1.0,
 ) -> Curve:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +11,9 @@ from rbcourse._checks import as_array, as_duration, as_finite, check_all, check_
 from rbcourse._numerics import Array, cross, matvec
 from rbcourse._valid import as_rotations, as_rotations_or_poses
 from rbcourse.body import Body
+
+Rate: TypeAlias = ArrayLike | None
+"""A velocity or an acceleration at one end of a curve; None is 0."""
 
 
 class _Ends(NamedTuple):
@@ -95,9 +98,9 @@ class Given(NamedTuple):
 def between(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
-    *accelerations: ArrayLike | None,
+    v0: Rate = None,
+    v1: Rate = None,
+    *accelerations: Rate,
     body: Body | None = None,
     duration: ArrayLike = 1.0,
 ) -> Given:
@@ -173,7 +176,7 @@ def at_centre(r: Array, rates: list[Array]) -> list[Array]:
     return points
 
 
-def _as_rate(name: str, value: ArrayLike | None, size: int) -> Array:
+def _as_rate(name: str, value: Rate, size: int) -> Array:
     """Return a velocity or an acceleration, shape (..., size); None means 0."""
     if value is None:
         return np.zeros(size)

@@ -19,7 +19,7 @@ from rbcourse.curves.curve import (
     least_over_time,
     near_margins,
 )
-from rbcourse.curves.ends import Ends, between
+from rbcourse.curves.ends import Ends, Rate, between
 from rbcourse.curves.rigid import moving
 from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singular
 from rbcourse.so3 import hat
@@ -122,8 +122,8 @@ class ProjectedPolynomial(Curve):
 def projected_cubic(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     body: Body | None = None,
     duration: ArrayLike = 1.0,
@@ -198,10 +198,10 @@ def projected_cubic(
 def projected_quintic(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
-    a0: ArrayLike | None = None,
-    a1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
+    a0: Rate = None,
+    a1: Rate = None,
     *,
     duration: ArrayLike = 1.0,
 ) -> Curve:

@@ -16,7 +16,7 @@ from rbcourse._docs import described_by
 from rbcourse._numerics import Array
 from rbcourse.body import Body
 from rbcourse.curves.curve import Curve
-from rbcourse.curves.ends import Ends, Given, between, on_rotations
+from rbcourse.curves.ends import Ends, Given, Rate, between, on_rotations
 from rbcourse.optimum._collocation import EXACT, Failure
 from rbcourse.optimum._result import OptimalMotion, OptimalRotation, Optimum, optimum_of
 from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, jerk
@@ -26,8 +26,8 @@ from rbcourse.optimum._search import body as of_body
 def minimum_acceleration(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     body: Body | None = None,
     duration: ArrayLike = 1.0,
@@ -123,8 +123,8 @@ def minimum_acceleration(
 def minimum_torque(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
     *,
     body: Body,
     duration: ArrayLike = 1.0,
@@ -183,10 +183,10 @@ def minimum_torque(
 def minimum_jerk(
     start: ArrayLike,
     goal: ArrayLike,
-    v0: ArrayLike | None = None,
-    v1: ArrayLike | None = None,
-    a0: ArrayLike | None = None,
-    a1: ArrayLike | None = None,
+    v0: Rate = None,
+    v1: Rate = None,
+    a0: Rate = None,
+    a1: Rate = None,
     *,
     duration: ArrayLike = 1.0,
 ) -> Optimum:
