@@ -47,7 +47,9 @@ def name_sections(_app: Any, doctree: Any) -> None:
 
 
 def skip_foreign(_app: Any, _what: str, _name: str, obj: Any, _skip: bool, _: Any) -> bool | None:
-    """Omit members of other packages."""
+    """Omit members of other packages, and fields of tuples, which have no text of their own."""
+    if (getattr(obj, "__doc__", None) or "").startswith("Alias for field number"):
+        return True
     module = getattr(obj, "__module__", None) or "rbcourse"
     return None if module.startswith(("rbcourse", "rbclassroom")) else True
 

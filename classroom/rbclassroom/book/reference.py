@@ -42,10 +42,11 @@ def modules(root: Path) -> dict[str, list[dict[str, Any]]]:
 
 
 def module(name: str, root: Path) -> dict[str, Any]:
-    """Return the names, the summary and the public members of a module, with constants last.
+    """Return the names, the summary and the public members of a module.
 
-    The public members are the names in ``__all__``; without ``__all__``, the names that `rbcourse`
-    exports and the classes of their results; if there are none, all definitions.
+    Names that `rbcourse` exports come first, and constants last. The public members are the names
+    in ``__all__``; without ``__all__``, they are the exported names and the classes of their
+    results; without exported names, all definitions.
     """
     tree = _parsed(name, root)
     about = (ast.get_docstring(tree) or "").partition("\n")[0]
@@ -67,7 +68,7 @@ def module(name: str, root: Path) -> dict[str, Any]:
         known = each if each in exported else f"{home if kind == 'data' else name}.{each}"
         if each in shown:
             members.append(Member(each, kind, home, full_name(known)))
-    members.sort(key=lambda member: member.kind == "data")
+    members.sort(key=lambda member: (member.kind == "data", member.name not in exported))
     return {"name": name, "full": full_name(name), "about": about, "members": members}
 
 

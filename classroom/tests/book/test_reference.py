@@ -35,8 +35,10 @@ def test_every_public_name_is_described_once_under_the_name_that_users_import():
     assert {name.rpartition(".")[2] for name in listed} - short == {"Plan", "Rng"}  # annotations
 
 
-def test_classes_of_results_are_described():
+def test_classes_of_results_are_described_after_the_exported_names():
     found = {each.address for module in MODULES for each in module["members"]}
+    (curve,) = (module for module in MODULES if module["name"] == "curves.curve")
+    assert [each.name for each in curve["members"]] == ["Curve", "State"]
     assert {f"rbcourse.{name}" for name in ("Curve", "Body", "optimum.Optimum")} <= found
     assert {f"rbcourse.curves.{name}" for name in ("chain.Chain", "timing.Timed")} <= found
 
