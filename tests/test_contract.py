@@ -54,21 +54,28 @@ class Maker:
     def __init__(self, function, size, *options):
         self.function, self.size, self.options = function, size, options
         self.parameters = inspect.signature(function).parameters
-        self.names = [name for name in ORDERS if name in self.parameters]
+        names = [name for name in ORDERS if name in self.parameters]
+        self.names = names or ["start", "goal", "v0", "v1"]  # of a function of this module
 
     def __call__(self, ends, **given):
         chosen = {name: OPTIONS[name](ends) for name in self.options}
         return self.function(*(ends[name] for name in self.names), **chosen | given)
 
 
+def needed(function):
+    has = inspect.signature(function).parameters
+    return [key for key in OPTIONS if key in has and has[key].default is has[key].empty]
+
+
 def makers():
     """Return a dict of all functions, with each option, for both groups."""
     found = {}
     for name, function in FUNCTIONS.items():
-        has = inspect.signature(function).parameters
-        needed = {key for key in OPTIONS if key in has and has[key].default is has[key].empty}
-        for option in [None, *(key for key in OPTIONS if key in has)]:
-            options = sorted({*needed, option} - {None})
+        for option in [
+            None,
+            *(key for key in OPTIONS if key in inspect.signature(function).parameters),
+        ]:
+            options = sorted({*needed(function), option} - {None})
             for size in {3, 4} - {REFUSED.get(name)}:
                 found["-".join([name, *options, str(size)])] = Maker(function, size, *options)
     return found
@@ -111,16 +118,14 @@ def moved(make, start, goal, v0, v1):
 bezier, cubic, optimum = rb.closed_forms.bezier, rb.projected_cubic, rb.minimum_acceleration
 DERIVED = {
     "retimed": lambda start, goal: rb.geodesic(start, goal).retimed(2.5),
-    "retimed cubic": lambda start, goal, v0, v1: cubic(start, goal, v0 / 2, v1 / 2).retimed(0.5),
-    "moved": lambda start, goal, v0, v1: moved(cubic, start, goal, v0, v1),
-    "moved optimum": lambda start, goal, v0, v1: moved(optimum, start, goal, v0, v1),
+    "retimed cubic": lambda A, B, v, w: cubic(A, B, v / 2, w / 2).retimed(0.5),
+    "moved": lambda *ends: moved(cubic, *ends),
+    "moved optimum": lambda *ends: moved(optimum, *ends),
 }
 MAKERS = makers() | {
     f"{name}-{size}": Maker(function, size) for name, function in DERIVED.items() for size in (3, 4)
 }
-MAKERS["stationary-3"] = Maker(
-    lambda start, goal, v0, v1: rb.optimum.stationary(bezier(start, goal, v0, v1)), 3
-)
+MAKERS["stationary-3"] = Maker(lambda *ends: rb.optimum.stationary(bezier(*ends)), 3)
 CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # each order has its core shape
 
 
@@ -434,8 +439,7 @@ def lasts_as_long_as_it_is_told(make):
 def altered(name, change):
     """Return a function that makes projected cubics with a method replaced by `change`."""
 
-    def make(start, goal, v0, v1):
-        ends = start, goal, v0, v1
+    def make(*ends):
         curve = copy(cubic(*ends))
         right = getattr(curve.__class__, name)
         changed = {name: lambda self, *given: change(right, self, *given)}
@@ -444,6 +448,9 @@ def altered(name, change):
         return curve
 
     return make
+
+
+OTHER = rb.Body(np.diag([1.0, 2, 2.5]))
 
 
 def with_arrays_that_can_be_changed(curve):
@@ -459,9 +466,9 @@ def scaled(order, by):
 # clause must detect.
 CONTRACT = {
     meets_its_ends: {
-        "end": lambda start, goal, v0, v1: bezier(start, goal @ rb.exp_so3([0, 0, 1e-9]), v0, v1),
-        "end velocity": lambda start, goal, v0, v1: bezier(start, goal, v0, 1.0000001 * v1),
-        "velocities exchanged": lambda start, goal, v0, v1: bezier(start, goal, v1, v0),
+        "end": lambda A, B, v, w: bezier(A, B @ rb.exp_so3([0, 0, 1e-9]), v, w),
+        "end velocity": lambda A, B, v, w: bezier(A, B, v, 1.0000001 * w),
+        "velocities exchanged": lambda A, B, v, w: bezier(A, B, w, v),
     },
     has_the_derivatives_of_its_values: {
         "velocity": scaled(1, 1.00001),
@@ -469,9 +476,7 @@ CONTRACT = {
         "jerk": scaled(3, 1.001),
     },
     is_the_stack_of_its_members: {
-        "wrong member": lambda start, goal, v0, v1: bezier(
-            start, np.flip(goal, range(goal.ndim - 2)), v0, v1
-        ),
+        "wrong member": lambda A, B, v, w: bezier(A, np.flip(B, range(B.ndim - 2)), v, w),
     },
     has_values_at_times_of_any_shape: {
         "wrong shape": altered("__call__", lambda call, c, t, k=0: call(c, np.ravel(t), k)),
@@ -489,21 +494,17 @@ CONTRACT = {
         ),
     },
     keeps_and_changes_no_arguments: {
-        "argument changed": lambda start, goal, v0, v1: bezier(
-            start, goal, np.add(v0, 1e-9, out=v0), v1
-        ),
+        "argument changed": lambda A, B, v, w: bezier(A, B, np.add(v, 1e-9, out=v), w),
         "argument kept": altered("__call__", lambda call, c, *given: cubic(*c.given)(*given)),
         "result kept": altered(
             "__call__", lambda call, c, t, k=0: c.known.setdefault(k, call(c, t, k))
         ),
     },
     has_arrays_that_cannot_be_changed: {
-        "array": lambda start, goal, v0, v1: with_arrays_that_can_be_changed(
-            cubic(start, goal, v0, v1)
-        ),
+        "array": lambda A, B, v, w: with_arrays_that_can_be_changed(cubic(A, B, v, w)),
     },
     refuses_bad_arguments_by_name: {
-        "unchecked": lambda start, goal, v0, v1: bezier(start, goal, np.nan_to_num(v0), v1),
+        "unchecked": lambda A, B, v, w: bezier(A, B, np.nan_to_num(v), w),
     },
     refuses_bad_times_and_orders: {
         "unchecked": altered("__call__", lambda call, c, t, k=0: call(c, np.clip(t, 0, 1), k)),
@@ -512,31 +513,21 @@ CONTRACT = {
         "other curve": altered("__reduce__", lambda _, c: (cubic, (*c.given[:3], c.given[2]))),
     },
     moves_with_its_ends: {
-        "body's axes": lambda start, goal, v0, v1: cubic(start, goal, v0, v1 * [1, 1, 1.0001]),
-        "room's axes": lambda start, goal, v0, v1: cubic(
-            start, goal, v0, v1 + 1e-6 * start[..., 0, :]
-        ),
+        "body's axes": lambda A, B, v, w: cubic(A, B, v, w * [1, 1, 1.0001]),
+        "room's axes": lambda A, B, v, w: cubic(A, B, v, w + 1e-6 * A[..., 0, :]),
     },
     is_reversed_with_its_ends: {
-        "one way": lambda start, goal, v0, v1: rb.closed_forms.cayley_cubic(start, goal, v0, v1),
+        "one way": lambda *ends: rb.closed_forms.cayley_cubic(*ends),
     },
     costs_the_same_if_it_is_moved: {
-        "centre": altered(
-            "_moved", lambda move, c, L, X: replace(move(c, L, X), body=rb.Body(np.diag([1, 2, 3])))
-        ),
+        "centre": altered("_moved", lambda move, c, L, X: replace(move(c, L, X), body=OTHER)),
     },
     knows_its_body: {
-        "body": lambda start, goal, v0, v1: replace(
-            cubic(start, goal, v0, v1), body=rb.Body(np.eye(3))
-        ),
-        "member's body": altered(
-            "retimed", lambda retime, c, T: replace(retime(c, T), body=rb.Body(np.eye(3)))
-        ),
+        "body": lambda *ends: replace(cubic(*ends), body=OTHER),
+        "member's body": altered("retimed", lambda retime, c, T: replace(retime(c, T), body=OTHER)),
     },
     lasts_as_long_as_it_is_told: {
-        "unit of time": lambda start, goal, v0, v1, *, duration=1.0: bezier(
-            start, goal, v0, v1
-        ).retimed(duration),
+        "unit of time": lambda A, B, v, w, *, duration=1.0: bezier(A, B, v, w).retimed(duration),
     },
 }
 
@@ -559,39 +550,29 @@ def test_every_function_that_returns_a_curve_is_tested():
                 first = next(iter(inspect.signature(function).parameters))
                 assert first in ("times", "curve", "rotation")
     assert len(FUNCTIONS) >= 16
-    assert {name.rpartition("-")[0] for name in MAKERS} >= set(FUNCTIONS) - {
-        "normal_cubic",
-        "minimum_torque",
-    }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_the_other_group_is_refused(name):
     size = REFUSED[name]
+    make = Maker(FUNCTIONS[name], size, *needed(FUNCTIONS[name]))
     with pytest.raises(ValueError, match=f"^start, goal: .*got {['rotations', 'poses'][size - 3]}"):
-        Maker(FUNCTIONS[name], size, *(FUNCTIONS[name] is rb.minimum_torque) * ["body"])(
-            sample(group=size)
-        )
+        make(sample(group=size))
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_errors_name_the_ends_that_do_not_fit_each_other(name):
     """Every combination of rotations and poses with velocities of both sizes is tried."""
     size, other = (4, 3) if name == "screw" else (3, 4)
-    make = Maker(FUNCTIONS[name], size, *["body"] * (name in ("normal_cubic", "minimum_torque")))
-    right, wrong = sample(group=size), sample(group=other)
-    for mixed in itertools.product((False, True), repeat=len(make.names)):
-        ends = right | {
-            key: wrong[key] for key, is_wrong in zip(make.names, mixed, strict=True) if is_wrong
-        }
-        if all(mixed) or not any(mixed):
-            continue
-        if mixed[0] != mixed[1]:
-            names = "start, goal"
-        else:
-            names = next(key for key, one in zip(make.names, mixed, strict=True) if one != mixed[0])
-        with pytest.raises(ValueError, match=f"^{names}: .* wanted"):
-            make(ends)
+    make = Maker(FUNCTIONS[name], size, *needed(FUNCTIONS[name]))
+    groups = sample(group=size), sample(group=other)
+    for chosen in itertools.product((0, 1), repeat=len(make.names)):
+        ends = {key: groups[i][key] for key, i in zip(make.names, chosen, strict=True)}
+        misfits = [key for key, i in zip(make.names, chosen, strict=True) if i != chosen[0]]
+        if misfits:
+            named = "start, goal" if "goal" in misfits else misfits[0]
+            with pytest.raises(ValueError, match=f"^{named}: .* wanted"):
+                make(groups[0] | ends)
 
 
 @pytest.mark.parametrize("clause", CONTRACT)
