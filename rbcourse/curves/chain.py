@@ -160,7 +160,7 @@ def projected_spline(
            [0., 0., 0.]]))
     """
     times, poses, _ = checked_path(times, poses)
-    body, size = as_body(body), 3 * poses.shape[-1] - 6
+    body, size = as_body(body, Body.ball()), 3 * poses.shape[-1] - 6
     w = cubic_velocities(times, poses, as_ends(ends, len(poses), size, rest_at), body)
     return _chain(partial(projected_cubic, body=body), times, poses, w)
 

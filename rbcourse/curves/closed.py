@@ -32,7 +32,7 @@ from rbcourse.curves.curve import (
     polynomial_jet,
     which_curve,
 )
-from rbcourse.curves.ends import Ends, Given, Rate, between
+from rbcourse.curves.ends import Ends, Given, Rate, as_body, between
 from rbcourse.curves.projected import projected_cubic, projected_quintic
 from rbcourse.curves.rigid import moving
 from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
@@ -248,7 +248,7 @@ def normal_cubic(
     >>> normal_cubic(np.eye(3), R1, v1=[0, 1, 0], body=book)(1, 1).round(12) + 0.0
     array([0., 1., 0.])
     """
-    given = between(start, goal, v0, v1, body=body, duration=duration)
+    given = between(start, goal, v0, v1, body=as_body(body), duration=duration)
     ends, T = given.ends, given.duration
     G = np.broadcast_to(given.body.inertia, (*T.shape, 3, 3))
     inverse, turn = np.linalg.inv(G), log(ends.turn)

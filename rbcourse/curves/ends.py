@@ -115,7 +115,7 @@ def between(
     names = "v0", "v1", "a0", "a1"
     given = zip(names, (v0, v1, *accelerations), strict=False)
     rates = {name: _as_rate(name, value, size) for name, value in given}
-    body, T = as_body(body), as_duration("duration", duration)
+    body, T = as_body(body, Body.ball()), as_duration("duration", duration)
     batch = check_broadcast(
         start=(start, 2),
         goal=(goal, 2),
@@ -154,9 +154,8 @@ def on_rotations(given: Given, what: str) -> Given:
 
 
 def as_body(body: Body | None, default: Body | None = None) -> Body:
-    """Return the body, or the default (by default the ball) in place of None."""
-    if body is None:
-        return default or Body.ball()
+    """Return the body, or the default in place of None; without a default, None is refused."""
+    body = default if body is None else body
     if not isinstance(body, Body):
         raise ValueError(f"body: a Body is wanted, such as Body(inertia), got {body!r}")
     return body

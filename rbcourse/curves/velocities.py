@@ -104,7 +104,7 @@ def spline_velocities(
     """
     times, poses, _ = checked_path(times, poses)
     conditions = as_ends(ends, len(poses), 3 * poses.shape[-1] - 6, rest_at)
-    return cubic_velocities(times, poses, conditions, as_body(body))
+    return cubic_velocities(times, poses, conditions, as_body(body, Body.ball()))
 
 
 def cubic_velocities(times: Array, poses: Array, conditions: Conditions, body: Body) -> Array:

@@ -91,7 +91,8 @@ def minimum_acceleration_spline(
     0.201
     """
     times, poses, _ = checked_path(times, poses)
-    size, h, of_mass = 3 * poses.shape[-1] - 6, np.diff(times), as_body(body)
+    size, h = 3 * poses.shape[-1] - 6, np.diff(times)
+    of_mass = as_body(body, Body.ball())
     conditions = as_ends(ends, len(poses), size)
     rotations = conditions._replace(given=conditions.given[:, :3])
     turning = _spline(times, poses[:, :3, :3], rotations, of_mass, "acceleration", long)

@@ -16,7 +16,7 @@ from rbcourse._docs import described_by
 from rbcourse._numerics import Array
 from rbcourse.body import Body
 from rbcourse.curves.curve import Curve
-from rbcourse.curves.ends import Ends, Given, Rate, between, on_rotations
+from rbcourse.curves.ends import Ends, Given, Rate, as_body, between, on_rotations
 from rbcourse.optimum._collocation import EXACT, Failure
 from rbcourse.optimum._result import OptimalMotion, OptimalRotation, Optimum, optimum_of
 from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, jerk
@@ -174,7 +174,7 @@ def minimum_torque(
     >>> minimum_torque(np.eye(3), exp_so3([0, 0, np.radians(100)]), body=book).certified
     True
     """
-    given = between(start, goal, v0, v1, body=body, duration=duration)
+    given = between(start, goal, v0, v1, body=as_body(body), duration=duration)
     given = on_rotations(given, "minimum torque")
     return _solved(of_body(given.ends, _inertias(given), of_torque=True), given)
 
