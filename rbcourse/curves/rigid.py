@@ -41,7 +41,8 @@ class RigidMotion(Curve):
 
     def values(self, t: Array, order: int) -> Array:
         """Return the pose, or (w, Rᵀ d'), or (w', Rᵀ d''), where d is the origin's position."""
-        rates = [self.rotation.values(t, k) for k in range(1, order + 1)]
+        orders = range(1, order + 1) if self.body.centre.any() else [order][:order]
+        rates = [self.rotation.values(t, k) for k in orders]
         R = self.rotation.values(t, 0)
         position = np.moveaxis(hermite_stack(self._terms, t, order), 0, -1)
         return _of_rotation_and_path(self.body.centre, R, rates, position, order)
