@@ -14,14 +14,17 @@ join two rotations or poses                  geodesic, screw, projected_line, pr
 join them with the least cost                minimum_acceleration, minimum_torque, minimum_jerk
 state the velocities of poses                twist_from_rates
 state which body moves                       Body(inertia, mass, centre), Body.box(sides, mass)
-pass through many poses                      projected_spline, quaternion_spline; chain, for given
-                                             velocities; joined, for a rotation and a position
-pass through them with the least cost        minimum_acceleration_spline, minimum_torque_spline,
-                                             minimum_jerk_spline
+pass through many poses with continuous      projected_spline (for any body), quaternion_spline;
+acceleration                                 joined, for a rotation and a position
+join them with given velocities              chain
+pass through them with the least cost        minimum_acceleration_spline (for any body); for
+                                             rotations, minimum_torque_spline, minimum_jerk_spline
 evaluate a curve c                           c(t), c(t, 1), c(t, 2); c.state(t) for all three
 slow it down, move it                        c.retimed(duration), c.moved(left, right)
 find its cost                                acceleration_cost, torque_cost, jerk_cost
-find out whether an optimum is one           c.certified; excess_estimate, for other curves
+find its excess over the optimum             its cost divided by the cost of the optimum, minus 1;
+                                             excess_estimate, for rotations and a ball
+find out whether an optimum is a minimum     c.certified
 follow a path in the least time              fastest; limits_used for the use of each limit
 read and write paths                         read_path, write_path
 draw                                         draw.profiles, and the module draw
@@ -31,9 +34,11 @@ optimum, files, textbook (short versions of the main algorithms), report and dra
 
 Conventions: angles are in rad, and lengths in m. Velocities are in the body frame, per unit of
 time: angular velocities ω, shape (3,), of rotations, and twists (ω, v), shape (6,), of poses. The
-shape decides: (..., 3, 3) are rotations, and (..., 4, 4) poses. Lists, and objects that have
-``as_matrix``, such as SciPy's ``Rotation`` and ``RigidTransform``, are accepted in place of arrays.
-Results are NumPy arrays in double precision; there is no automatic differentiation.
+shape decides: (..., 3, 3) are rotations, and (..., 4, 4) poses. For poses, c(t, 2) is the
+acceleration (ω', Rᵀ d''), not the derivative of the twist. Quaternions are (w, x, y, z). Lists, and
+objects that have ``as_matrix``, such as SciPy's ``Rotation`` and ``RigidTransform``, are accepted
+in place of arrays. Results are NumPy arrays in double precision; there is no automatic
+differentiation.
 
 An argument that is not finite, has the wrong shape or is outside the stated range raises a
 ValueError that names it. So does a matrix that is not symmetric or positive definite where this is
@@ -60,13 +65,13 @@ from rbcourse.conversions import (
     quaternion_from_matrix,
     zyx_from_matrix,
 )
-from rbcourse.curves.chain import chain, joined, projected_spline, quaternion_spline
+from rbcourse.curves.chain import Chain, chain, joined, projected_spline, quaternion_spline
 from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.geodesics import geodesic, screw, screw_from_pose
 from rbcourse.curves.projected import projected_cubic, projected_quintic
 from rbcourse.curves.projected_line import projected_line
-from rbcourse.curves.timing import Limits, fastest, limits_used
+from rbcourse.curves.timing import Limits, Timed, fastest, limits_used
 from rbcourse.curves.velocities import bessel_velocities, spline_velocities
 from rbcourse.files import read_path, write_path
 from rbcourse.optimum import (
@@ -177,6 +182,8 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "write_path",
     # for annotations
     "Array",
+    "Chain",
+    "Timed",
 ]
 
 if TYPE_CHECKING:

@@ -34,8 +34,7 @@ def as_array(
         raise ValueError(f"{name}: real numbers are wanted, got dtype {given.dtype}")
     if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
         wanted = ", ".join([*["..."] * stacked, *map(str, core)])
-        hint = converter(given.shape) if core in ((3, 3), (4, 4)) else ""
-        raise ValueError(f"{name}: shape ({wanted}) is wanted, got {given.shape}{hint}")
+        raise ValueError(f"{name}: shape ({wanted}) is wanted, got {given.shape}")
     array: Array = given.astype(np.float64, copy=copy)
     return array
 
@@ -255,19 +254,6 @@ def _matrices_of(value: Any) -> Any:
     if isinstance(value, list | tuple) and any(hasattr(part, "as_matrix") for part in value):
         return [_matrices_of(part) for part in value]
     return value
-
-
-def converter(shape: tuple[int, ...]) -> str:
-    """Name the function that makes rotations or poses of arrays of this shape, if there is one."""
-    if shape[-2:] in ((3, 3), (4, 4)):
-        return "; pose_from_components makes poses of rotations and positions" * (shape[-1] == 3)
-    makers = {
-        3: "exp_so3 makes rotations of rotation vectors",
-        4: "matrix_from_quaternion makes rotations of quaternions (w, x, y, z)",
-        6: "pose_from_coordinates makes poses of rotation vectors and positions",
-        7: "pose_from_components makes poses of rotations and positions",
-    }
-    return f"; {makers[shape[-1]]}" if shape and shape[-1] in makers else ""
 
 
 def _has_core(shape: tuple[int, ...], core: tuple[int | str, ...]) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_array, as_finite, converter, first_index
+from rbcourse._checks import as_array, as_finite, first_index
 from rbcourse._foam import Entries, cofactors, determinant
 from rbcourse._numerics import Array, blocks
 from rbcourse.projection import nearest
@@ -22,14 +22,18 @@ _LAST_ROW = np.array([0.0, 0, 0, 1])
 
 def as_rotations(name: str, value: ArrayLike) -> Array:
     """Return rotation matrices, shape (..., 3, 3)."""
-    R = as_finite(name, value, 3, 3)
+    R = as_finite(name, value)
+    if R.shape[-2:] != (3, 3):
+        raise _wrong_shape(name, R.shape, "(..., 3, 3)")
     _repair(name, R, "rotation", "project_so")
     return R
 
 
 def as_poses(name: str, value: ArrayLike) -> Array:
     """Return poses, shape (..., 4, 4)."""
-    A = as_finite(name, value, 4, 4)
+    A = as_finite(name, value)
+    if A.shape[-2:] != (4, 4):
+        raise _wrong_shape(name, A.shape, "(..., 4, 4)")
     row = A[..., 3, :]
     wrong = ~(np.abs(row - _LAST_ROW).max(axis=-1) <= REMOVED)
     if wrong.any():
@@ -49,8 +53,7 @@ def as_rotations_or_poses(name: str, value: ArrayLike) -> tuple[Array, int]:
         return as_rotations(name, A), 3
     if A.shape[-2:] == (4, 4):
         return as_poses(name, A), 6
-    wanted = "shape (..., 3, 3) or (..., 4, 4)"
-    raise ValueError(f"{name}: {wanted} is wanted, got {A.shape}{converter(A.shape)}")
+    raise _wrong_shape(name, A.shape, "(..., 3, 3) or (..., 4, 4)")
 
 
 def as_unit_quaternions(name: str, value: ArrayLike) -> Array:
@@ -68,6 +71,25 @@ def as_unit_quaternions(name: str, value: ArrayLike) -> Array:
     near = deviation > ACCEPTED
     q[near] /= norm[near][..., None]
     return q
+
+
+def _wrong_shape(name: str, shape: tuple[int, ...], wanted: str) -> ValueError:
+    """Return an error that names the function that makes matrices of arrays of this shape."""
+    makers = {
+        (3, 3): "pose_from_components makes poses of rotations and positions",
+        (3, 4): "a pose also has the row [0, 0, 0, 1]",
+        3: "exp_so3 makes rotations of rotation vectors",
+        4: "matrix_from_quaternion makes rotations of quaternions (w, x, y, z)",
+        6: "pose_from_coordinates makes poses of rotation vectors and positions",
+        7: "pose_from_components makes poses of positions and of the rotations that "
+        "matrix_from_quaternion makes of quaternions (w, x, y, z)",
+    }
+    if shape[-2:] == (4, 4):
+        hint = None
+    else:
+        hint = makers.get(shape[-2:]) or makers.get(shape[-1] if shape else 0)
+    cure = f"; {hint}" if hint else ""
+    return ValueError(f"{name}: shape {wanted} is wanted, got {shape}{cure}")
 
 
 def _repair(name: str, R: Array, kind: str, cure: str) -> None:

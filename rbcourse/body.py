@@ -63,6 +63,8 @@ class Body:
     def __init__(
         self, inertia: ArrayLike, mass: float = 1.0, centre: ArrayLike = (0.0, 0.0, 0.0)
     ) -> None:
+        if np.shape(inertia) == (3,):
+            raise ValueError("inertia: a matrix is wanted, such as np.diag(moments), got 3 numbers")
         G, r = as_inertia("inertia", inertia), as_single("centre", centre, 3)
         self._set(G, as_positive("mass", mass), r)
 

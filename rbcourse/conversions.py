@@ -20,7 +20,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     Parameters
     ----------
     q : array_like, shape (..., 4)
-        Unit quaternions.
+        Unit quaternions (w, x, y, z). (SciPy's ``as_quat()`` returns (x, y, z, w).)
 
     Returns
     -------

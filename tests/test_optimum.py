@@ -295,5 +295,5 @@ def test_an_inertia_is_no_body(make):
 
 @pytest.mark.parametrize("make", [partial(rb.minimum_torque, body=BODY), rb.minimum_jerk])
 def test_an_optimum_of_rotations_alone_refuses_poses(make):
-    with pytest.raises(ValueError, match=r"^start, goal: minimum (torque|jerk) is .* got poses$"):
+    with pytest.raises(ValueError, match=r"^start, goal: minimum \w+ is .* got poses; take"):
         make(np.eye(4), np.eye(4))

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 import rbcourse as rb
 
@@ -266,12 +266,12 @@ UNEVEN = rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]).retimed(H)
         (UNEVEN[0].retimed, ([1, 2],), "duration: a single number or shape"),
         (LATE.retimed, (1e-9,), "duration is 1e-09: it vanishes by rounding when added"),
         *(
-            (rb.projected_spline, (TIMES, POSES, ends), "ends: ")
+            (rb.projected_spline, (TIMES, POSES, ends), "ends")
             for ends in ("free", (TWISTS[0, :3], None), 3)
         ),
-        (UNEVEN[0].moved, (POSES[0],), "left: shape (3, 3) is wanted, got (4, 4)"),
+        (UNEVEN[0].moved, (POSES[0],), "left: shape (3, 3) is wanted, since"),
         (UNEVEN[0].moved, (None, 2 * np.eye(3)), "right is not a rotation"),
-        (LATE.moved, (ROTATIONS[:2],), "left: shape (3, 3) is wanted, got (2, 3, 3)"),
+        (LATE.moved, (ROTATIONS[:2],), "left: shape (3, 3) is wanted, since"),
     ],
 )
 def test_bad_paths_and_durations_are_refused(function, arguments, message):
@@ -350,6 +350,12 @@ def test_a_rotation_and_a_position_are_joined(turn):
         assert translation == pytest.approx(squares @ np.diff(knots) / k**3, rel=1e-9)
 
 
+def corners(share):
+    """Return straight lines with a corner in the middle of this share of the first leg."""
+    t = share * H[0] * np.array([0, 0.5, 1])
+    return make_interp_spline(t, [[0, 0, 0], [1, 0, 0], [1, 1, 0]], k=1)
+
+
 @pytest.mark.parametrize(
     ("turn", "path", "message"),
     [
@@ -362,7 +368,14 @@ def test_a_rotation_and_a_position_are_joined(turn):
             np.sin,
             "rotation: it is a Timed; join its path and the position, then call fastest",
         ),
-        (UNEVEN[0], POSES[:2, :3, 3], "position: a callable position(t, order) is wanted, got a"),
+        (UNEVEN[0], POSES[:2, :3, 3], "position: a callable position(t, order) is wanted, such as"),
+        (
+            UNEVEN[0],
+            lambda t: np.zeros(3),
+            "position: a callable position(t, order) is wanted, such",
+        ),
+        (UNEVEN[0], corners(1), "position: its velocity jumps at t = "),
+        (UNEVEN[0], corners(0.5), "position: its knots from 0.0 to "),
         (UNEVEN[0], lambda t, k: np.zeros(3), "position(t, 0): shape (1, 3) is wanted, got (3,)"),
         (UNEVEN[0], lambda t, k: np.full((1, 3), np.nan), "position(t, 0)[0, 0] is nan, a finite"),
     ],

@@ -354,7 +354,7 @@ def test_bad_ends_are_refused(name):
         ([[0, 0, 0]], wanted),
         (np.zeros(()), wanted),
         (np.zeros((3, 3)), wanted),
-        (([0, 0], None), r"ends: shape \(3\) is wanted"),
+        (([0, 0], None), r"ends\[0\]: shape \(3,\) is wanted"),
         (([0, 0, np.nan], None), "ends"),
     ):
         with pytest.raises(ValueError, match=f"^{message}"):

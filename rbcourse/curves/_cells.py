@@ -138,11 +138,15 @@ def as_limits(
     **given: ArrayLike | None,
 ) -> list[Limit]:
     """Check the arguments of `fastest`, and return the limits that are not None."""
-    if not isinstance(curve, Curve) or curve.batch_shape:
-        raise ValueError(f"curve: a single Curve, not a stack, is wanted, got {curve!r}")
-    bounds = {name: as_finite(name, bound) for name, bound in given.items() if bound is not None}
-    for name, bound in bounds.items():
-        _check_bound(name, bound, curve.size)
+    if not isinstance(curve, Curve):
+        raise ValueError(f"curve: a Curve is wanted, got {type(curve).__name__}")
+    if curve.batch_shape:
+        raise ValueError(f"curve: a single curve, not a stack, is wanted, got {curve!r}")
+    bounds = {
+        name: _as_bound(name, bound, curve.size)
+        for name, bound in given.items()
+        if bound is not None
+    }
     if not bounds:
         raise ValueError(f"limits: none of {', '.join(SPEEDS + BENDS)} is given")
     moved = as_body(body, curve.body)
@@ -153,13 +157,16 @@ def as_limits(
     return [Limit(name, bound, moved, g) for name, bound in bounds.items()]
 
 
-def _check_bound(name: str, bound: Array, size: int) -> None:
+def _as_bound(name: str, value: ArrayLike, size: int) -> Array:
     if name not in SPEEDS + BENDS:
-        raise TypeError(f"{name}: no limit has this name")
-    if bound.shape not in ((), (3,)) or bound.min() <= 0:
-        raise ValueError(f"{name}: one or three numbers above 0 are wanted, got {bound.tolist()}")
+        known = ", ".join(SPEEDS + BENDS)
+        raise TypeError(f"{name}: no limit has this name; the limits are {known}")
     if size == 3 and name in ("speed", "acceleration", "force"):
         raise ValueError(f"{name}: a curve on SO(3) has no such limit")
+    bound = as_finite(name, value)
+    if bound.shape not in ((), (3,)) or bound.min() <= 0:
+        raise ValueError(f"{name}: one or three numbers above 0 are wanted, got {bound.tolist()}")
+    return bound
 
 
 def fastest_motion(curve: Curve, limits: list[Limit], ends: Array) -> Triple:

@@ -40,6 +40,7 @@ from rbcourse.curves.velocities import (
 Leg = Callable[..., Curve]
 
 _ARRIVED = 1e-6
+_SMOOTH = 1e-9  # a velocity jumps if it changes at a knot by more than this share of the largest
 
 
 def chain(
@@ -214,8 +215,9 @@ def joined(rotation: Curve, position: Position) -> Curve:
     position : callable
         ``position(t, order)`` returns the position of the origin in the fixed frame, in m, or its
         derivative of order 1 or 2, shape (N, 3), at times t, shape (N,), in the domain of
-        `rotation`. SciPy's ``CubicSpline`` and ``make_interp_spline`` are such callables; their
-        knots may differ from those of the rotation.
+        `rotation`. It must be continuously differentiable; only for SciPy's splines, such as
+        ``CubicSpline`` and ``make_interp_spline``, this is checked. Their knots may differ from
+        those of the rotation.
 
     Returns
     -------
@@ -243,8 +245,7 @@ def joined(rotation: Curve, position: Position) -> Curve:
         raise ValueError(
             "rotation: it is a Timed; join its path and the position, then call fastest"
         )
-    if not callable(position):
-        raise ValueError(f"position: a callable position(t, order) is wanted, got {position!r}")
+    _check_position(position, rotation.domain)
     if not isinstance(rotation, Chain):
         return _joined(rotation, position, np.array(rotation.domain[0]))
     legs = _joined(rotation.legs, position, rotation.times[:-1])
@@ -256,6 +257,31 @@ def joined(rotation: Curve, position: Position) -> Curve:
         velocities=None,
     )
     return replace(chain, velocities=chain(chain.times, 1))
+
+
+def _check_position(position: Position, domain: tuple[float, float]) -> None:
+    """Refuse what is not called as position(t, order), and a SciPy spline that is not smooth."""
+    wanted = "position: a callable position(t, order) is wanted, such as a CubicSpline"
+    if not callable(position):
+        raise ValueError(f"{wanted}, got {type(position).__name__}")
+    try:
+        signature(position).bind(np.array(domain), 1)
+    except TypeError as error:
+        raise ValueError(f"{wanted} ({error})") from error
+    except ValueError:  # no signature is known
+        pass
+    knots = np.unique(getattr(position, "x", getattr(position, "t", domain)))
+    start, end = domain
+    if knots[0] > start or (knots[-1] < end and not np.isclose(knots[-1], end, rtol=1e-12)):
+        raise ValueError(
+            f"position: its knots from {knots[0]} to {knots[-1]} do not cover {start} to {end}"
+        )
+    inner = knots[(knots > start) & (knots < end)]
+    after, before = (np.asarray(position(t, 1)) for t in (inner, np.nextafter(inner, -np.inf)))
+    jumps = np.abs(after - before) > _SMOOTH * np.abs(after).max(initial=0)
+    if jumps.any():
+        where = inner[np.argmax(jumps.any(axis=-1))]
+        raise ValueError(f"position: its velocity jumps at t = {where}; a smooth path is wanted")
 
 
 def _joined(rotation: Curve, position: Position, first: Array) -> Joined:

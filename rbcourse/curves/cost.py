@@ -188,9 +188,11 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
 def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
     """Raise ValueError unless the argument is a `Curve` (on SO(3), if `on_so3` is True)."""
     if not isinstance(curve, Curve):
-        raise ValueError(f"curve: a Curve is wanted, got {curve!r}")
+        raise ValueError(f"curve: a Curve is wanted, got {type(curve).__name__}")
     if on_so3 and curve.size != 3:
-        raise ValueError(f"curve: a curve on SO(3) is wanted, got {curve!r}")
+        raise ValueError(
+            f"curve: a curve on SO(3) is wanted, got {curve!r}; rotations are poses[:, :3, :3]"
+        )
 
 
 def _inertias(curve: Curve, legs: Curve, body: Body) -> Array:

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from rbcourse._checks import (
     as_array,
     as_duration,
-    as_single,
     as_time,
     check_broadcast,
     check_order,
@@ -22,7 +21,7 @@ from rbcourse._checks import (
 from rbcourse._hermite import hermite
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
-from rbcourse._valid import as_poses, as_rotations
+from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import Body
 from rbcourse.curves._html import curve_html
 
@@ -45,7 +44,10 @@ class SingularTime(ValueError):
 
 
 class State(NamedTuple):
-    """A curve and its first two derivatives: ``c(t)``, ``c(t, 1)`` and ``c(t, 2)``."""
+    """A curve and its first two derivatives: ``c(t)``, ``c(t, 1)`` and ``c(t, 2)``.
+
+    For poses, the acceleration is (w', Rᵀ d''), as `Curve` defines it.
+    """
 
     pose: Array
     velocity: Array
@@ -168,7 +170,8 @@ class Curve:
         Parameters
         ----------
         t : array_like, shape t.shape
-            Times in the domain.
+            Times in the domain. A controller whose last time is after the end of the curve uses
+            ``min(t, c.domain[1])``.
 
         Returns
         -------
@@ -332,14 +335,25 @@ class Curve:
         >>> tip(1)[:3, 3].round(12), tip(1, 1)[3:].round(3)
         (array([0., 2., 0.]), array([0.   , 3.142, 0.   ]))
         """
-        check = as_rotations if self.size == 3 else as_poses
-        L, X = (
-            np.eye(self.size)
-            if given is None
-            else check(name, as_single(name, given, *self._core(0)))
-            for name, given in (("left", left), ("right", right))
-        )
+        L, X = self._frame("left", left), self._frame("right", right)
         return self._moved(L, X)
+
+    def _frame(self, name: str, given: ArrayLike | None) -> Array:
+        core = self._core(0)
+        if given is None:
+            return np.eye(self.size)
+        if self.size == 4 and np.shape(given) == (3,):
+            raise ValueError(
+                f"{name}: a pose is wanted, such as pose_from_components(np.eye(3), d), got {given}"
+            )
+        frame, _ = as_rotations_or_poses(name, given)
+        if frame.shape != core:
+            what = {3: "rotations", 4: "poses"}[self.size]
+            raise ValueError(
+                f"{name}: shape {core} is wanted, since the curve consists of {what}, "
+                f"got {frame.shape}"
+            )
+        return frame
 
     def _moved(self, L: Array, X: Array) -> Curve:
         d = X[:3, 3] if self.size == 4 else np.zeros(3)

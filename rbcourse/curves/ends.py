@@ -149,7 +149,9 @@ def between(
 def on_rotations(given: Given, what: str) -> Given:
     """Return the boundary conditions; refuse poses."""
     if given.path:
-        raise ValueError(f"start, goal: {what} is defined for rotations, got poses")
+        raise ValueError(
+            f"start, goal: {what} is defined for rotations, got poses; take their blocks [:3, :3]"
+        )
     return given
 
 

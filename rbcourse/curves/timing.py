@@ -30,7 +30,10 @@ PLATEAU = 1e-6  # the share below the maximum within which `limits_used` takes t
 
 
 class Limits(TypedDict, total=False):
-    """The largest allowed values of a motion, and the gravity; `fastest` describes them."""
+    """The largest allowed values of a motion, and the gravity, for annotations.
+
+    The keys are the names below; `fastest` describes them.
+    """
 
     angular_speed: ArrayLike | None
     speed: ArrayLike | None
@@ -60,13 +63,13 @@ def fastest(
     body : Body, optional
         The body that moves, by default ``curve.body``. It is required for a limit on the torque or
         the force if the body of the curve is the default ball. Its centre is the point whose speed
-        and acceleration are limited; ``curve.moved(right=...)`` moves the origin to another point,
-        such as the tip of a tool.
+        and acceleration are limited. To limit those of another point, such as the tip of a tool,
+        give a body with this centre; the torque is the same, but the force is not.
     rates : (float, float), optional
         The values of s' at both ends: 0 is rest, and 1 is the velocity of the path itself. A rate
         has no effect at an end where the curve rests.
     **limits : Limits
-        At least one limit on an acceleration, the torque or the force is required.
+        The keyword arguments are:
 
         angular_speed, speed : float or array_like, shape (3,)
             The largest norms of ω, in rad per unit time, and of the velocity of the centre, in m
@@ -102,6 +105,8 @@ def fastest(
 
     Notes
     -----
+    At least one limit on an acceleration, the torque or the force is required.
+
     The grid has 1,000 cells or, for a chain, 250 for each leg. If there are many legs, each has 25
     cells, 50 next to a stop, or as few as 4 if its velocity hardly changes. A leg in which a limit
     is exceeded by more than 1e-4 gets twice as many cells, up to three times. T is then about 1e-3
@@ -272,7 +277,7 @@ class Timed(Curve):
 
     def values(self, t: Array, order: int) -> Array:
         """Raise RuntimeError, because costs require smooth curves."""
-        raise RuntimeError("curve: a Timed curve has no cost here, because its acceleration jumps")
+        raise RuntimeError("curve: the cost of a Timed curve is not computed; integrate c.state(t)")
 
     @property
     def flat(self) -> Self:

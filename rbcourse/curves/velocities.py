@@ -30,7 +30,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import as_single
+from rbcourse._checks import as_finite, as_single
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse._quaternions import quaternion_of
@@ -69,17 +69,18 @@ def spline_velocities(
     poses : array_like, shape (N, 3, 3) or (N, 4, 4)
         A rotation matrix or a pose for each of the times.
     ends : {"natural", "rest", "periodic"} or pair of array_like, optional
-        "natural": the acceleration is 0 at both ends. "rest": the velocity is 0 at both ends.
-        "periodic": velocity and acceleration in the body frame are the same at both ends; the poses
-        there may differ. A pair gives the first and the last velocity in the body frame: angular
-        velocities, shape (3,), or twists (ω, v), shape (6,). None in a pair means a natural end.
+        "natural": the acceleration (for a body, the torque) is 0 at both ends. "rest": the velocity
+        is 0 at both ends. "periodic": velocity and acceleration in the body frame are the same at
+        both ends; the poses there may differ. A pair gives the first and the last velocity in the
+        body frame: angular velocities, shape (3,), or twists (ω, v), shape (6,). None in a pair
+        means a natural end.
     rest_at : sequence of int, optional
         The indices of other poses at which the velocity is 0. A repeated pose is not such a pose
         unless it is listed here.
     body : Body, optional
-        The body that moves, by default the ball of metric (12). For other bodies, the torque is
-        continuous, "natural" means zero torque at the ends, and the centre of mass moves on a cubic
-        spline.
+        The body that moves, by default the ball of metric (12). Each of its principal moments is at
+        most the sum of the other two. The torque is then continuous, and the centre of mass moves
+        on a cubic spline.
 
     Returns
     -------
@@ -238,7 +239,9 @@ def as_ends(
     fixed, given = _rests(rest_at, count), np.zeros((count, size))
     if isinstance(ends, str):
         if ends not in ("natural", "rest", "periodic"):
-            raise ValueError(f"ends: {_ENDS} is wanted, got {ends!r}")
+            word: str = ends
+            hint = "; 'clamped' is 'rest' here" if word == "clamped" else ""
+            raise ValueError(f"ends: {_ENDS} is wanted, got {ends!r}{hint}")
         if ends == "periodic" and fixed.any():
             raise ValueError("rest_at: not with ends='periodic'")
         fixed[[0, -1]] |= ends == "rest"
@@ -248,8 +251,18 @@ def as_ends(
         raise ValueError(f"ends: {_ENDS} is wanted, got {ends!r}")
     for place, value in ((0, pair[0]), (-1, pair[1])):
         if value is not None:
-            fixed[place], given[place] = True, as_single("ends", value, size)
+            fixed[place], given[place] = True, _end_rate(f"ends[{place % 2}]", value, size)
     return Conditions(fixed, given)
+
+
+def _end_rate(name: str, value: ArrayLike, size: int) -> Array:
+    if isinstance(value, str):
+        raise ValueError(f"{name}: a velocity or None is wanted, got {value!r}")
+    rate = as_finite(name, value)
+    if rate.shape != (size,):
+        hint = "; twist_from_rates makes twists (ω, v)" if size == 6 else ""
+        raise ValueError(f"{name}: shape ({size},) is wanted, got {rate.shape}{hint}")
+    return rate
 
 
 def _rests(rest_at: Sequence[int] | NDArray[np.integer], count: int) -> NDArray[np.bool_]:

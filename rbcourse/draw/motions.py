@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from rbcourse import Array, Body, Curve, Limits
+from rbcourse import Array, Body, Curve, Limits, limits_used
 from rbcourse.draw.save import COLOURS
 
 _NAMES = {
@@ -50,11 +50,10 @@ def profiles(curve: Curve, *, body: Body | None = None, **limits: Unpack[Limits]
     """
     if not isinstance(curve, Curve) or curve.batch_shape:
         raise ValueError(f"curve: a single Curve is wanted, got {curve!r}")
+    if limits:
+        limits_used(curve, body=body, **limits)  # checks the arguments
     t = np.linspace(*curve.domain, _TIMES)
     drawn = _vectors(curve, t, body or curve.body, np.asarray(limits.pop("gravity", np.zeros(3))))
-    unknown = [name for name, x in limits.items() if x is not None and name not in drawn]
-    if unknown:
-        raise ValueError(f"{unknown[0]}: this curve has no such limit")
     shown = [name for name in drawn if name not in ("torque", "force") or limits.get(name)]
     columns = 2 if curve.size == 4 else 1
     rows = -(-len(shown) // columns)

@@ -22,21 +22,24 @@ SPEED_LIMIT = 2.5
 def excess_estimate(curve: Curve) -> Array:
     """Return an estimate of a curve's excess over the optimum, without solving for the optimum.
 
+    The optimum has the same ends. That of a `chain` has the same rotations and velocities at its
+    poses, so that the excess over `minimum_acceleration_spline` is larger. Costs are those of a
+    ball.
     Source: beyond BK 11; BK (19).
 
     Parameters
     ----------
     curve : Curve
-        A smooth curve on SO(3), or a stack of such curves.
+        A smooth curve on SO(3), or a stack of such curves, whose body is the ball. (For another
+        body, divide `acceleration_cost` by the ``cost`` of the optimum.)
 
     Returns
     -------
     ndarray, shape curve.batch_shape
-        An estimate of (cost of the curve)/(cost of the optimum) − 1. A `chain` is compared with the
-        optimal legs that have the same velocities at its poses; if its velocity jumps, RuntimeError
-        is raised. The estimate is NaN if the curve reaches the `SPEED_LIMIT`, costs more than about
-        twice the optimum, is not smooth enough for 33 nodes, costs nothing, or is NaN itself. It is
-        also NaN if the second variation is not positive definite.
+        An estimate of (cost of the curve)/(cost of the optimum) − 1. If the velocity of a `chain`
+        jumps, RuntimeError is raised. The estimate is NaN if the curve reaches the `SPEED_LIMIT`,
+        costs more than about twice the optimum, is not smooth enough for 33 nodes, costs nothing,
+        or is NaN itself. It is also NaN if the second variation is not positive definite.
 
     Notes
     -----
@@ -59,6 +62,8 @@ def excess_estimate(curve: Curve) -> Array:
     0.0197
     """
     check_curve(curve)
+    if not curve.body.is_ball:
+        raise ValueError(f"curve: the estimate is for the ball, got {curve.body!r}")
     legs = smooth_parts(curve, "excess estimate", 1)
     t, _, integral, _ = grid(_NODES)
     w, a = (np.moveaxis(legs.flat.values(t[:, None], order), 1, 0) for order in (1, 2))

@@ -263,7 +263,10 @@ class OptimalChain(Chain):
 def _rotations(times: ArrayLike, poses: ArrayLike) -> tuple[Array, Array]:
     times, rotations, _ = checked_path(times, poses)
     if rotations.shape[-1] != 3:
-        raise ValueError(f"poses: rotations, shape (N, 3, 3), are wanted, got {rotations.shape}")
+        raise ValueError(
+            f"poses: rotations, shape (N, 3, 3), are wanted, got {rotations.shape}; "
+            "take poses[:, :3, :3]"
+        )
     return times, rotations
 
 
