@@ -39,6 +39,8 @@ def matvec(A: Array, x: Array) -> Array:
 def cross(x: Array, y: Array, axis: int = -1) -> Array:
     """Return x × y, several times faster than `numpy.cross`; `axis` is 0 or −1."""
     product = np.empty(np.broadcast(x, y).shape)
+    if axis == -1 and x.ndim != y.ndim:  # the transposes below align the first axes
+        x, y = (z.reshape((1,) * (product.ndim - z.ndim) + z.shape) for z in (x, y))
     (a, b, c), (u, v, w), parts = (z if axis == 0 else z.T for z in (x, y, product))
     parts[0], parts[1], parts[2] = b * w - c * v, c * u - a * w, a * v - b * u
     return product

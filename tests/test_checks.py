@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rbcourse import _checks as checks
+from rbcourse._numerics import cross
 
 EPS = np.finfo(float).eps
 
@@ -48,3 +49,9 @@ def test_times_and_angles_just_outside_an_interval_are_moved_to_its_end():
     for bad in (-1e-300, 3.2):
         with pytest.raises(ValueError, match=re.escape(f"angle is {bad}, an angle in [0, π]")):
             checks.as_angle(bad)
+
+
+@pytest.mark.parametrize("shapes", [((4, 4, 3), (4, 3)), ((3,), (5, 4, 3)), ((5, 1, 3), (4, 3))])
+def test_cross_products_broadcast(shapes):
+    x, y = (np.random.default_rng(3).normal(size=shape) for shape in shapes)
+    np.testing.assert_allclose(cross(x, y), np.cross(x, y), rtol=0, atol=1e-15)

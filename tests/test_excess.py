@@ -288,5 +288,5 @@ def test_only_curves_on_so3_have_an_estimate():
 def test_the_excess_of_a_body_other_than_the_ball_is_not_estimated():
     book = rb.Body(np.diag([1.0, 2, 2.5]))
     curve = rb.projected_cubic(np.eye(3), rb.exp_so3([0, 0, 1]), [0, 1, 0], body=book)
-    with pytest.raises(ValueError, match="^curve: the estimate is for the ball"):
+    with pytest.raises(ValueError, match=r"^curve: the estimate is for the ball"):
         rb.excess_estimate(curve)
