@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from rbcourse._numerics import Array
 
-if TYPE_CHECKING:
-    from rbcourse.curves.curve import Curve
-
 _WIDTH, _HEIGHT = 240, 60
 
 
-def curve_html(curve: Curve) -> str:
-    """Return the description of a curve and, for a single curve, a picture of its speeds."""
+def curve_html(curve: Any) -> str:
+    """Return the description of a `Curve` and, for a single curve, a picture of its speeds."""
     words = escape(repr(curve)[1:-1])
     if curve.batch_shape:
         return f"<div>{words}</div>"

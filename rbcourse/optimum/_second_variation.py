@@ -27,7 +27,7 @@ positive definite.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,6 @@ from numpy.typing import NDArray
 from rbcourse._chebyshev import Grid, grid
 from rbcourse._numerics import Array, matvec
 from rbcourse.so3 import hat
-
-if TYPE_CHECKING:
-    from rbcourse.optimum._result import OptimalRotation
 
 _PENALTY = 1e4  # the penalty is this number times (‖c‖ + 1) ‖M‖
 _CLEAR = 1e-6  # a smaller eigenvalue may differ from 0 only by rounding
@@ -59,12 +56,12 @@ def polynomials(m: int, k: int, nodes: int) -> list[Any]:
     return [legval(2 * grid(nodes).t - 1, c).T for c in made]
 
 
-def is_positive(curve: OptimalRotation) -> NDArray[np.bool_]:
-    """Tell for which curves of the stack the second variation is proven to be positive."""
+def is_positive(curve: Any) -> NDArray[np.bool_]:
+    """Tell for which optimal rotations the second variation is proven to be positive."""
     return np.array([_is_positive(curve.take([i])) for i in range(curve.count)], dtype=bool)
 
 
-def _is_positive(curve: OptimalRotation) -> bool:
+def _is_positive(curve: Any) -> bool:
     if np.isnan(curve.constant).any():
         return False
     for m in _DEGREES:
@@ -74,7 +71,7 @@ def _is_positive(curve: OptimalRotation) -> bool:
     return False
 
 
-def least_eigenvalues(curve: OptimalRotation, m: int) -> tuple[float, float]:
+def least_eigenvalues(curve: Any, m: int) -> tuple[float, float]:
     """Return the least eigenvalues of Q and of Q − E/(1 − γ), with m polynomials for each axis.
 
     `curve` is a stack with one element. The second value is −∞ if γ is 1 or more.
