@@ -18,7 +18,8 @@ def curve_html(curve: Any) -> str:
     if curve.batch_shape:
         return f"<div>{words}</div>"
     try:
-        rates = curve(np.linspace(*curve.domain, 121), 1)
+        start, end = curve.domain
+        rates = curve(np.linspace(start, end, 121), 1)
     except (RuntimeError, ValueError):  # the curve jumps
         return f"<div>{words}</div>"
     drawn = _line(rates[:, :3], "#0072b2", "‖ω‖", "rad")
