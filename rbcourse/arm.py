@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import as_finite, as_single, check_all, first_index
 from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array
-from rbcourse.planar import Plan, interpolate, propagate
+from rbcourse.planar import Plan, interpolate, interpolate_planar, propagate
 
 __all__ = [
     "LINKS",
@@ -84,11 +84,6 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     Singular set: all links lie on one line, stretched or folded. The rank is then 1.
     Source: RR 4.
 
-    Parameters
-    ----------
-    q, lengths
-        As for `arm_forward_kinematics`.
-
     Returns
     -------
     ndarray, shape (..., 2, n)
@@ -150,6 +145,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     return np.stack([shoulder - 2 * np.pi * turns, elbow], axis=-1)
 
 
+@described_by(interpolate_planar)
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
     """Interpolate joint angles linearly in equal steps, without removing full turns.
 
@@ -159,8 +155,6 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     ----------
     start, goal : array_like, shape (..., n)
         Joint angles at both ends, in rad.
-    steps : int, optional
-        The number of equal steps, at least 1.
 
     Returns
     -------
@@ -178,6 +172,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     return interpolate(start, as_finite("goal", goal, start.shape[-1]), steps)
 
 
+@described_by(returns="(commands + 1, ..., n)")
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     """Return the joint angles, with full turns, at the start and after each command of a plan.
 
@@ -190,10 +185,6 @@ def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     plan : iterable of (velocity, duration)
         Pairs of n joint velocities, in rad/s, and a duration of at least 0, in s. The plan may be
         empty.
-
-    Returns
-    -------
-    ndarray, shape (commands + 1, ..., n)
 
     Examples
     --------

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_symmetric, check_broadcast, first_index
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array, scaled
 from rbcourse._valid import as_rotations_or_poses
 from rbcourse.projection import project_se, project_so
@@ -70,6 +71,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     return np.ldexp(C.reshape(m, m, m), i + j - k)
 
 
+@described_by(returns="(..., m, m, m)")
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """Return the Christoffel symbols Γ of a left-invariant metric in a left-invariant frame.
 
@@ -87,10 +89,6 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
         definite.
     basis : array_like, shape (m, n, n)
         The frame L_1 … L_m at the identity, as for `structure_constants`.
-
-    Returns
-    -------
-    ndarray, shape (..., m, m, m)
 
     Examples
     --------
@@ -111,6 +109,7 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     return (C + raised) / 2
 
 
+@described_by(returns="(..., m)")
 def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: ArrayLike) -> Array:
     """Return the covariant derivative x_dot[i] + gamma[i, j, k] v[j] x[k] of a field along a curve.
 
@@ -125,10 +124,6 @@ def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: Ar
     v, x, x_dot : array_like, shape (..., m)
         The velocity of the curve, the field, and the time derivative of the field, in
         left-invariant components.
-
-    Returns
-    -------
-    ndarray, shape (..., m)
 
     Examples
     --------

@@ -1,4 +1,16 @@
-"""Conversions between rotation matrices, quaternions, rotation vectors and ZYX angles."""
+"""Conversions between rotation matrices, quaternions, rotation vectors and ZYX angles.
+
+Parameters
+----------
+q : array_like, shape (..., 4)
+    Unit quaternions.
+R : array_like, shape (..., 3, 3)
+    Rotation matrices.
+w : array_like, shape (..., 3)
+    Rotation vectors, in rad.
+angles : array_like, shape (..., 3)
+    Angles (yaw, pitch, roll), in rad.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +18,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array
 from rbcourse._quaternions import axis_and_angle, quaternion_of, rotation_vector_of
 from rbcourse._taylor import matrix
 from rbcourse._valid import as_rotations, as_unit_quaternions
 
 
+@described_by(__doc__, returns="(..., 3, 3)")
 def matrix_from_quaternion(q: ArrayLike) -> Array:
     """Return the rotation matrix R of a unit quaternion; q and −q give the same matrix.
 
     Source: RR 2.2.
-
-    Parameters
-    ----------
-    q : array_like, shape (..., 4)
-        Unit quaternions (w, x, y, z). (SciPy's ``as_quat()`` returns (x, y, z, w).)
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
 
     Examples
     --------
@@ -36,6 +41,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     return matrix(np.moveaxis(as_unit_quaternions("q", q), -1, 0))
 
 
+@described_by(__doc__, returns="(..., 4)")
 def quaternion_from_matrix(R: ArrayLike) -> Array:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix, with w ≥ 0.
 
@@ -43,15 +49,6 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     normalised. The result is accurate to a few eps. Singular set: half-turns, where
     `canonical_quaternion` chooses between q and −q.
     Source: BK Remark 7.
-
-    Parameters
-    ----------
-    R : array_like, shape (..., 3, 3)
-        Rotation matrices.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
 
     Examples
     --------
@@ -61,15 +58,11 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     return quaternion_of(as_rotations("R", R))
 
 
+@described_by(__doc__)
 def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     """Return the quaternion (cos(a/2), sin(a/2) w/a) of the rotation by a = ‖w‖ about w.
 
     Source: BK 2.5, RR 2.2.
-
-    Parameters
-    ----------
-    w : array_like, shape (..., 3)
-        Rotation vectors, in rad.
 
     Returns
     -------
@@ -86,21 +79,13 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     return np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=-1)
 
 
+@described_by(__doc__, returns="(..., 3)")
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Return the shortest rotation vector of a unit quaternion; q and −q give the same vector.
 
     Up to rounding, the angle is in [0, π]. The result is accurate to a few eps. Singular set:
     half-turns, where `canonical_quaternion` chooses the axis.
     Source: BK 2.5, RR 2.2.
-
-    Parameters
-    ----------
-    q : array_like, shape (..., 4)
-        Unit quaternions (w, x, y, z).
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
 
     Examples
     --------
@@ -110,21 +95,13 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     return rotation_vector_of(as_unit_quaternions("q", q))
 
 
+@described_by(__doc__, returns="(..., 3, 3)")
 def matrix_from_zyx(angles: ArrayLike) -> Array:
     """Return R_z(α) R_y(β) R_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
     The turns are about axes of the *body*: first z, then the new y, then the new x. Equivalently,
     they are about *fixed* axes: first x, then y, then z.
     Source: RR 2.1, RR (7), RR (8).
-
-    Parameters
-    ----------
-    angles : array_like, shape (..., 3)
-        Angles (yaw, pitch, roll), in rad.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
 
     Examples
     --------
@@ -137,15 +114,11 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
     return _turn_about(2, alpha) @ _turn_about(1, beta) @ _turn_about(0, gamma)
 
 
+@described_by(__doc__)
 def zyx_from_matrix(R: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), as `zyx_from_quaternion` does.
 
     Source: RR 2.1, RR (7), RR (8).
-
-    Parameters
-    ----------
-    R : array_like, shape (..., 3, 3)
-        Rotation matrices.
 
     Returns
     -------
@@ -160,15 +133,11 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     return zyx_from_quaternion(quaternion_from_matrix(R))
 
 
+@described_by(__doc__)
 def quaternion_from_zyx(angles: ArrayLike) -> Array:
     """Return q_z(α) q_y(β) q_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
     Source: RR 2.2, where α turns about x and γ about z.
-
-    Parameters
-    ----------
-    angles : array_like, shape (..., 3)
-        Angles (yaw, pitch, roll), in rad.
 
     Returns
     -------
@@ -190,6 +159,7 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
     return np.stack([w, x, y, z], axis=-1)
 
 
+@described_by(__doc__)
 def zyx_from_quaternion(q: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
 
@@ -198,11 +168,6 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     to eps divided by the distance of β from ±π/2, but α ∓ γ is accurate to eps.
     Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
     17(11), 2022.
-
-    Parameters
-    ----------
-    q : array_like, shape (..., 4)
-        Unit quaternions.
 
     Returns
     -------

@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array
 from rbcourse.conversions import matrix_from_quaternion, quaternion_from_matrix
 from rbcourse.planar import Commands, Plan, as_command, as_plan
@@ -200,6 +201,7 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     write_csv(file, [*names, DURATION], rows)
 
 
+@described_by(save_plan)
 def load_plan(file: File, kind: str) -> Commands:
     """Read a plan that `save_plan` or a spreadsheet wrote.
 
@@ -211,9 +213,6 @@ def load_plan(file: File, kind: str) -> Commands:
     ----------
     file : str or Path
         A file of comma-separated values in UTF-8. The first line has the names of the columns.
-    kind : {"world", "body", "joints"}
-        The kind of velocities: planar velocities in the world or the body frame, or joint
-        velocities.
 
     Returns
     -------

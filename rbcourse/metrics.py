@@ -15,6 +15,7 @@ from rbcourse._checks import (
     as_symmetric,
     check_broadcast,
 )
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import weight_of
@@ -43,6 +44,7 @@ METRIC_SE3 = np.diag([2.0, 2, 2, 1, 1, 1])
 METRIC_SO3.flags.writeable = METRIC_SE3.flags.writeable = False
 
 
+@described_by(returns="(...)")
 def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors X, Y of GL(n) at one point.
 
@@ -55,10 +57,6 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     X, Y : array_like, shape (..., n, n)
         Tangent vectors at one point, as matrices.
 
-    Returns
-    -------
-    ndarray, shape (...)
-
     Examples
     --------
     >>> float(inner_gl([[1, 2], [3, 4]], [[1, 0], [0, 1]]))
@@ -67,6 +65,7 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, "n")
 
 
+@described_by(returns="(...)")
 def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) = 2 x · y for tangent vectors X = R hat_so3(x), Y = R hat_so3(y).
 
@@ -79,10 +78,6 @@ def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     X, Y : array_like, shape (..., 3, 3)
         Tangent vectors at one point, as matrices.
 
-    Returns
-    -------
-    ndarray, shape (...)
-
     Examples
     --------
     >>> float(inner_so3(tangent_from_components(np.eye(3), [1, 2, 3]), hat_so3([1, 0, 1])))
@@ -91,6 +86,7 @@ def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, 3)
 
 
+@described_by(returns="(...)")
 def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors of GA(n), the affine maps.
 
@@ -101,10 +97,6 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
     X, Y : array_like, shape (..., n + 1, n + 1)
         Tangent vectors at one point, as matrices whose last rows are 0.
 
-    Returns
-    -------
-    ndarray, shape (...)
-
     Examples
     --------
     >>> float(inner_ga([[1, 2], [0, 0]], [[3, 4], [0, 0]]))  # the last rows are 0
@@ -113,6 +105,7 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, "n+1")
 
 
+@described_by(returns="(...)")
 def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) = 2 ω_x · ω_y + v_x · v_y for X = A hat_se3(x), Y = A hat_se3(y).
 
@@ -126,10 +119,6 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     X, Y : array_like, shape (..., 4, 4)
         Tangent vectors at one point, as matrices.
 
-    Returns
-    -------
-    ndarray, shape (...)
-
     Examples
     --------
     >>> X = hat_se3([1, 0, 0, 0, 3, 0])
@@ -139,6 +128,7 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, 4)
 
 
+@described_by(returns="(...)")
 def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike) -> Array:
     """Return ⟨X, Y⟩ = xᵀ G y at A in the left-invariant metric with the matrix G.
 
@@ -150,10 +140,6 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
         The symmetric matrix of the metric at the identity, for angular velocities or twists.
     A, X, Y : array_like, shape (..., 3, 3) or (..., 4, 4)
         Rotations or poses A, and tangent vectors X and Y at A, with the components x and y.
-
-    Returns
-    -------
-    ndarray, shape (...)
 
     Examples
     --------
@@ -169,6 +155,7 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     return np.vecdot(x, matvec(G, y))
 
 
+@described_by(returns="(6, 6)")
 def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     """Return [[alpha I, beta I], [beta I, 0]], an indefinite bi-invariant metric.
 
@@ -182,10 +169,6 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
         Positive numbers. alpha is the weight of rotation, and beta couples rotation to translation.
         If the result is an energy per mass, alpha is in m² and beta is in m.
 
-    Returns
-    -------
-    ndarray, shape (6, 6)
-
     Examples
     --------
     >>> S = np.array([0, 0, 1, 0, 0, -1])  # a left-handed screw
@@ -197,6 +180,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     return metric
 
 
+@described_by(returns="(..., 3, 3) or (..., 4, 4)")
 def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     """Return the tangent vector X = A hat(x), the value at A of the left-invariant field of x.
 
@@ -206,10 +190,6 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     ----------
     A, x : array_like, shapes (..., 3, 3) and (..., 3), or (..., 4, 4) and (..., 6)
         Rotations and angular velocities, or poses and twists.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3) or (..., 4, 4)
 
     Examples
     --------
@@ -278,6 +258,7 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     return _trace_times_identity(W) - W
 
 
+@described_by(returns="(..., 3, 3)")
 def weight_from_inertia(G: ArrayLike) -> Array:
     """Return the weight W = tr(G)/2 I − G, which satisfies tr(W) I − W = G.
 
@@ -292,10 +273,6 @@ def weight_from_inertia(G: ArrayLike) -> Array:
     G : array_like, shape (..., 3, 3)
         Symmetric matrices. Each eigenvalue is at most the sum of the other two, up to a few eps of
         the largest.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
 
     Examples
     --------

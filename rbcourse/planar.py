@@ -4,6 +4,11 @@ Poses are in m, m and rad. Unless a docstring says otherwise, they are in the wo
 count full turns: theta and theta + 2π give the same orientation, but the latter has one more turn.
 A twist is (vx, vy, omega) in the body frame. A plan is a list of commands (velocity, duration). A
 path is an array with one row for each state.
+
+Parameters
+----------
+pose : array_like, shape (..., 3)
+    Poses (x, y, theta).
 """
 
 from __future__ import annotations
@@ -15,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_count, as_finite, as_single, check_all, check_broadcast
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, scaled, sinc
 
 __all__ = [
@@ -33,15 +39,11 @@ Plan: TypeAlias = Iterable[tuple[ArrayLike, float]]
 Commands: TypeAlias = list[tuple[Array, float]]
 
 
+@described_by(__doc__)
 def matrix_from_planar(pose: ArrayLike) -> Array:
     """Return the matrices [[cos θ, −sin θ, x], [sin θ, cos θ, y], [0, 0, 1]] of planar poses.
 
     Source: RR 3.1.
-
-    Parameters
-    ----------
-    pose : array_like, shape (..., 3)
-        Poses (x, y, theta).
 
     Returns
     -------
@@ -64,6 +66,7 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
     return A
 
 
+@described_by(returns="(..., 3)")
 def planar_from_matrix(A: ArrayLike) -> Array:
     """Return the planar poses (x, y, theta) of matrices, with −π ≤ theta ≤ π.
 
@@ -76,10 +79,6 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     ----------
     A : array_like, shape (..., 3, 3)
         Elements of SE(2), or matrices near them. The last row is not read.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
 
     Examples
     --------
@@ -119,19 +118,11 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     return np.concatenate([moved, (pose[..., 2] + step[..., 2])[..., None]], axis=-1)
 
 
+@described_by(__doc__, returns="(..., 3)")
 def inverse_planar(pose: ArrayLike) -> Array:
     """Return the pose of the world in the body frame; composed with `pose`, it gives (0, 0, 0).
 
     Source: RR 3.2.
-
-    Parameters
-    ----------
-    pose : array_like, shape (..., 3)
-        Poses (x, y, theta).
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
 
     Examples
     --------
@@ -172,17 +163,13 @@ def exp_planar(S: ArrayLike) -> Array:
     return np.concatenate([chord, S[..., 2:]], axis=-1)
 
 
+@described_by(__doc__)
 def log_planar(pose: ArrayLike) -> Array:
     """Return the body twist with −π ≤ omega ≤ π that leads from (0, 0, 0) to a pose in unit time.
 
     Singular set: half-turns, to which two twists lead. theta = π gives omega = π, and −π gives −π.
     If full turns are added to these angles, rounding decides the sign.
     Source: RR 3.1.
-
-    Parameters
-    ----------
-    pose : array_like, shape (..., 3)
-        Poses (x, y, theta).
 
     Returns
     -------

@@ -1,4 +1,10 @@
-"""The nearest rotation, the nearest pose, and tests of membership, in any dimension n."""
+"""The nearest rotation, the nearest pose, and tests of membership, in any dimension n.
+
+Parameters
+----------
+M : array_like, shape (..., n, n)
+    Any square matrices.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +21,7 @@ from rbcourse._checks import (
     check_broadcast,
     first_index,
 )
+from rbcourse._docs import described_by
 from rbcourse._foam import nearest_rotation, nearest_rotations
 from rbcourse._numerics import EPS, Array, scaled
 
@@ -92,6 +99,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     return passes[()]
 
 
+@described_by(__doc__, returns="(..., n, n)")
 def project_so(M: ArrayLike) -> Array:
     """Return the rotation R nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
 
@@ -99,15 +107,6 @@ def project_so(M: ArrayLike) -> Array:
     L, the projection of L M is L R, and that of M L is R L. The paper prints U Vᵀ, which is a
     reflection if det M < 0.
     Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
-
-    Parameters
-    ----------
-    M : array_like, shape (..., n, n)
-        Any square matrices.
-
-    Returns
-    -------
-    ndarray, shape (..., n, n)
 
     See Also
     --------
@@ -131,6 +130,7 @@ def project_so(M: ArrayLike) -> Array:
     return np.ascontiguousarray(nearest(as_array("M", M, "n", "n", copy=False))[0])
 
 
+@described_by(returns="(..., n, n)")
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     """Return the rotation R that minimizes √tr(XᵀX W), where X = M − R: `project_so` of M W.
 
@@ -144,10 +144,6 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
         W is symmetric (up to 1e-12 of the largest entry) and has no negative eigenvalues (up to a
         few eps of the largest). For a body, it is ∫ p pᵀ dm over its points p in the body frame. A
         scale factor of W does not matter.
-
-    Returns
-    -------
-    ndarray, shape (..., n, n)
 
     Notes
     -----
@@ -175,6 +171,7 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     return nearest(scaled(M) @ W)[0]
 
 
+@described_by(returns="(..., n, n)")
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     """Orthonormalise the columns of M from left to right by the Gram–Schmidt method.
 
@@ -187,10 +184,6 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     ----------
     M : array_like, shape (..., n, n)
         The columns must be linearly independent.
-
-    Returns
-    -------
-    ndarray, shape (..., n, n)
 
     Examples
     --------
@@ -215,20 +208,12 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     return Q
 
 
+@described_by(__doc__, returns="(...)")
 def distance_to_so(M: ArrayLike) -> Array:
     """Return the Frobenius norm ‖M − R‖ for the nearest rotation R: √Σ (σ_i − 1)².
 
     Here σ_i are the singular values of M; the smallest is multiplied by the sign of det M.
     Source: BK 4, BK Remark 6, where the paper prints the square, without the sign.
-
-    Parameters
-    ----------
-    M : array_like, shape (..., n, n)
-        Any square matrices.
-
-    Returns
-    -------
-    ndarray, shape (...)
 
     Examples
     --------
@@ -287,6 +272,7 @@ def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
     return turn
 
 
+@described_by(returns="(..., n + 1, n + 1)")
 def project_se(B: ArrayLike) -> Array:
     """Return [[project_so(B1), B2], [0, 1]]: the pose nearest to B = [[B1, B2], [0, 1]].
 
@@ -296,10 +282,6 @@ def project_se(B: ArrayLike) -> Array:
     ----------
     B : array_like, shape (..., n + 1, n + 1)
         Its last row is replaced by [0, 1].
-
-    Returns
-    -------
-    ndarray, shape (..., n + 1, n + 1)
 
     Examples
     --------

@@ -1,4 +1,10 @@
-"""Unit quaternions (w, x, y, z) as rotations; q and −q give the same rotation."""
+"""Unit quaternions (w, x, y, z) as rotations; q and −q give the same rotation.
+
+Parameters
+----------
+q : array_like, shape (..., 4)
+    Quaternions of any norm.
+"""
 
 from __future__ import annotations
 
@@ -73,6 +79,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
         return ((np.abs(norm - 1) <= atol) & np.isfinite(norm))[()]
 
 
+@described_by(returns="(..., 4)")
 def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Return Hamilton's product p q of quaternions (w, x, y, z): rotation by q, and then by p.
 
@@ -82,10 +89,6 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     ----------
     p, q : array_like, shape (..., 4)
         Quaternions of any norm.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
 
     Examples
     --------
@@ -97,19 +100,11 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     return np.moveaxis(multiply(np.moveaxis(p, -1, 0), np.moveaxis(q, -1, 0)), 0, -1)
 
 
+@described_by(__doc__, returns="(..., 4)")
 def quaternion_conjugate(q: ArrayLike) -> Array:
     """Return (w, −x, −y, −z), the inverse of a unit quaternion.
 
     Source: RR 2.2.
-
-    Parameters
-    ----------
-    q : array_like, shape (..., 4)
-        Quaternions of any norm.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
 
     Examples
     --------
@@ -119,6 +114,7 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
     return as_finite("q", q, 4) * _CONJUGATE + 0.0
 
 
+@described_by(returns="(..., 3)")
 def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     """Return rotated points: the vector part of q p q⁻¹.
 
@@ -131,10 +127,6 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     p : array_like, shape (..., 3)
         Vectors.
 
-    Returns
-    -------
-    ndarray, shape (..., 3)
-
     Examples
     --------
     >>> rotate_by_quaternion([0, 0, 0, 1], [1, 2, 3])  # a half-turn about z
@@ -146,6 +138,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     return quaternion_multiply(quaternion_multiply(q, pure), quaternion_conjugate(q))[..., 1:]
 
 
+@described_by(returns="(..., 4)")
 def project_quaternion(q: ArrayLike) -> Array:
     """Return the unit quaternion nearest to q, which is q/‖q‖.
 
@@ -157,10 +150,6 @@ def project_quaternion(q: ArrayLike) -> Array:
     q : array_like, shape (..., 4)
         Quaternions (w, x, y, z) other than 0.
 
-    Returns
-    -------
-    ndarray, shape (..., 4)
-
     Examples
     --------
     >>> project_quaternion([10, 10, 10, 10])
@@ -169,6 +158,7 @@ def project_quaternion(q: ArrayLike) -> Array:
     return as_unit("q", q, 4)
 
 
+@described_by(__doc__, returns="(..., 4)")
 def canonical_quaternion(q: ArrayLike) -> Array:
     """Return q or −q, whichever has w ≥ 0: a unique quaternion for each rotation.
 
@@ -176,15 +166,6 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     chosen so that the component of largest magnitude is positive. If several components have the
     largest magnitude (up to 1e-8), the first of them is made positive.
     Source: BK Remark 7.
-
-    Parameters
-    ----------
-    q : array_like, shape (..., 4)
-        Quaternions of any norm.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
 
     Examples
     --------
@@ -226,6 +207,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     return q + 0.0
 
 
+@described_by(returns="t.shape + (..., 4)")
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 
@@ -239,10 +221,6 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
         Unit quaternions. The arc ends at q1 or −q1, whichever is nearer to q0.
     t : array_like
         Times in [0, 1], of any shape.
-
-    Returns
-    -------
-    ndarray, shape t.shape + (..., 4)
 
     Examples
     --------
@@ -263,7 +241,7 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     return np.moveaxis(value, 0, -1)
 
 
-@described_by(slerp)
+@described_by(slerp, returns="t.shape + (..., 4)")
 def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the longer arc from the rotation q0 to the rotation q1.
 
@@ -272,15 +250,6 @@ def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     are the same rotation up to 4 eps; ValueError is raised. Near this set, the axis is accurate to
     eps/‖q1 − q0‖.
     Source: BK Remark 7; K. Shoemake, Animating rotation with quaternion curves, SIGGRAPH 1985.
-
-    Parameters
-    ----------
-    q0, q1, t
-        As for `slerp`.
-
-    Returns
-    -------
-    ndarray, shape t.shape + (..., 4)
 
     Examples
     --------

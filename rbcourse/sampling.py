@@ -35,6 +35,7 @@ __all__ = [
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
 
 
+@described_by(returns="(..., 3, 3)")
 def arvo_rotation(x: ArrayLike) -> Array:
     """Return Arvo's rotation −M B for three numbers; uniform numbers give uniform rotations.
 
@@ -47,10 +48,6 @@ def arvo_rotation(x: ArrayLike) -> Array:
     ----------
     x : array_like, shape (..., 3)
         x₁, x₂, z in [0, 1].
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
 
     Examples
     --------
@@ -128,11 +125,6 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
 
     Source: RR 2.2, RR (13).
 
-    Parameters
-    ----------
-    size, rng
-        As for `sample_rotation`.
-
     Returns
     -------
     ndarray, shape size + (4,)
@@ -148,21 +140,12 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
     return _in_blocks(_shoemake, (4,), size, rng)
 
 
-@described_by(sample_rotation)
+@described_by(sample_rotation, returns="size + (3, 3)")
 def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return R_z(α) R_y(β) R_x(γ) for angles uniform on [0, 2π); the rotations are not uniform.
 
     The mean E tr² of the squared trace is 7/8; for uniform rotations, it is 1.
     Source: RR 2.1, RR (7), RR (8).
-
-    Parameters
-    ----------
-    size, rng
-        As for `sample_rotation`.
-
-    Returns
-    -------
-    ndarray, shape size + (3, 3)
 
     Examples
     --------
@@ -172,22 +155,13 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
     return matrix_from_zyx(_three_angles(size, rng))
 
 
-@described_by(sample_rotation)
+@described_by(sample_rotation, returns="size + (4,)")
 def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return q_z(γ) q_y(β) q_x(α) for angles uniform on [0, 2π); the quaternions are not uniform.
 
     The rotations have the distribution of `sample_rotation_naive`, but the first random angle turns
     about x, not about z.
     Source: RR 2.2, RR (12).
-
-    Parameters
-    ----------
-    size, rng
-        As for `sample_rotation`.
-
-    Returns
-    -------
-    ndarray, shape size + (4,)
 
     Examples
     --------
@@ -275,6 +249,7 @@ class UniformityTest(NamedTuple):
     null: str
 
 
+@described_by(returns="(...)")
 def angle_law(angle: ArrayLike) -> Array:
     """Return the probability (a − sin a)/π that a uniform rotation turns by at most a.
 
@@ -285,10 +260,6 @@ def angle_law(angle: ArrayLike) -> Array:
     ----------
     angle : array_like, shape (...)
         The angle a, in [0, π].
-
-    Returns
-    -------
-    ndarray, shape (...)
 
     Examples
     --------

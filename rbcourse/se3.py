@@ -1,6 +1,13 @@
 """Poses and twists: SE(3), its Lie algebra se(3), exp, log, and coordinates.
 
 A twist is (ω, v): the angular velocity and the velocity of the origin, both in the body frame.
+
+Parameters
+----------
+A : array_like, shape (..., 4, 4)
+    Poses.
+S : array_like, shape (..., 6)
+    Twists (ω, v).
 """
 
 from __future__ import annotations
@@ -9,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_single, check_broadcast
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse._valid import as_poses, as_rotations, as_rotations_or_poses
 from rbcourse.so3 import (
@@ -21,6 +29,7 @@ from rbcourse.so3 import (
 )
 
 
+@described_by(returns="(..., 4, 4)")
 def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     """Return the pose [[R, d], [0, 1]].
 
@@ -32,10 +41,6 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
         Rotation matrices.
     d : array_like, shape (..., 3)
         Positions in the fixed frame.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
 
     Examples
     --------
@@ -50,15 +55,11 @@ def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     return join(R, d)
 
 
+@described_by(__doc__)
 def components_from_pose(A: ArrayLike) -> tuple[Array, Array]:
     """Return R and d of a pose [[R, d], [0, 1]]; d is the position in the fixed frame.
 
     Source: BK 2.1.
-
-    Parameters
-    ----------
-    A : array_like, shape (..., 4, 4)
-        Poses.
 
     Returns
     -------
@@ -86,19 +87,11 @@ def join(R: Array, d: Array) -> Array:
     return A
 
 
+@described_by(__doc__, returns="(..., 4, 4)")
 def inverse_se3(A: ArrayLike) -> Array:
     """Return the inverse of a pose: [[Rᵀ, −Rᵀ d], [0, 1]].
 
     Source: BK 2.1.
-
-    Parameters
-    ----------
-    A : array_like, shape (..., 4, 4)
-        Poses.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
 
     Examples
     --------
@@ -111,6 +104,7 @@ def inverse_se3(A: ArrayLike) -> Array:
     return join(Rt, -matvec(Rt, d))
 
 
+@described_by(returns="(..., 4, 4)")
 def pose_from_coordinates(x: ArrayLike) -> Array:
     """Return the pose with rotation exp_so3(σ) and position d, in the fixed frame.
 
@@ -120,10 +114,6 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
     ----------
     x : array_like, shape (..., 6)
         Coordinates (σ, d).
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
 
     Examples
     --------
@@ -136,20 +126,12 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
     return join(exp_so3(x[..., :3]), x[..., 3:])
 
 
+@described_by(__doc__, returns="(..., 6)")
 def coordinates_from_pose(A: ArrayLike) -> Array:
     """Return the coordinates (σ, d) of a pose: σ = log_so3(R), and d in the fixed frame.
 
     Singular set: half-turns, as for `log_so3`.
     Source: BK 2.5.
-
-    Parameters
-    ----------
-    A : array_like, shape (..., 4, 4)
-        Poses.
-
-    Returns
-    -------
-    ndarray, shape (..., 6)
 
     Examples
     --------
@@ -160,19 +142,11 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     return np.concatenate([log(R), d], axis=-1)
 
 
+@described_by(__doc__, returns="(..., 4, 4)")
 def hat_se3(S: ArrayLike) -> Array:
     """Return the matrix of a twist S = (ω, v): [[hat_so3(ω), v], [0, 0]].
 
     Source: BK 2.1, BK (1), BK (3).
-
-    Parameters
-    ----------
-    S : array_like, shape (..., 6)
-        Twists (ω, v).
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
 
     Examples
     --------
@@ -188,6 +162,7 @@ def hat_se3(S: ArrayLike) -> Array:
     return matrix
 
 
+@described_by(returns="(..., 6)")
 def vee_se3(matrix: ArrayLike) -> Array:
     """Return the twist (ω, v) of a matrix [[ω̂, v], [0, 0]]: the inverse of `hat_se3`.
 
@@ -197,10 +172,6 @@ def vee_se3(matrix: ArrayLike) -> Array:
     ----------
     matrix : array_like, shape (..., 4, 4)
         The skew-symmetric part of its 3 × 3 block is used; the last row is ignored.
-
-    Returns
-    -------
-    ndarray, shape (..., 6)
 
     Examples
     --------
@@ -216,6 +187,7 @@ BASIS_SE3 = hat_se3(np.eye(6))
 BASIS_SE3.flags.writeable = False
 
 
+@described_by(returns="(..., 4, 4)")
 def exp_se3(S: ArrayLike) -> Array:
     """Return the pose to which the constant twist S = (ω, v) leads from I in unit time.
 
@@ -228,10 +200,6 @@ def exp_se3(S: ArrayLike) -> Array:
     ----------
     S : array_like, shape (..., 6)
         Twists (ω, v), for one unit of time: ω in rad, v in m.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
 
     Examples
     --------
@@ -247,21 +215,13 @@ def exp_se3(S: ArrayLike) -> Array:
     return join(exp_so3(w), matvec(left_jacobian, v))
 
 
+@described_by(__doc__, returns="(..., 6)")
 def log_se3(A: ArrayLike) -> Array:
     """Return the twist (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π.
 
     The result is accurate to a few eps (1 + ‖d‖). Singular set: half-turns, where two twists give
     A. `log_so3` then chooses ω.
     Source: BK 2.6.
-
-    Parameters
-    ----------
-    A : array_like, shape (..., 4, 4)
-        Poses.
-
-    Returns
-    -------
-    ndarray, shape (..., 6)
 
     Examples
     --------
@@ -274,20 +234,12 @@ def log_se3(A: ArrayLike) -> Array:
     return np.concatenate([w, matvec(left_jacobian_inverse, d)], axis=-1)
 
 
+@described_by(__doc__, returns="(..., 6, 6)")
 def adjoint_se3(A: ArrayLike) -> Array:
     """Return [[R, 0], [d̂ R, R]], which maps twists from the body frame of A to the fixed frame.
 
     ``hat_se3(adjoint_se3(A) @ S)`` is A hat_se3(S) A⁻¹.
     Source: BK 2.1.
-
-    Parameters
-    ----------
-    A : array_like, shape (..., 4, 4)
-        Poses.
-
-    Returns
-    -------
-    ndarray, shape (..., 6, 6)
 
     Examples
     --------

@@ -1,4 +1,12 @@
-"""The rotation group SO(3) and its Lie algebra so(3): hat, vee, exp, log and their Jacobians."""
+"""The rotation group SO(3) and its Lie algebra so(3): hat, vee, exp, log and their Jacobians.
+
+Parameters
+----------
+w : array_like, shape (..., 3)
+    Rotation vectors, in rad.
+R : array_like, shape (..., 3, 3)
+    Rotation matrices.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array, sinc
 from rbcourse._quaternions import axis_and_angle, quaternion_of, rotation_vector_of
 from rbcourse._valid import as_rotations
@@ -31,6 +40,7 @@ def vee(W: Array) -> Array:
     return W.reshape(*W.shape[:-2], 9) @ (BASIS_SO3.reshape(3, 9).T / 2)
 
 
+@described_by(returns="(..., 3, 3)")
 def hat_so3(w: ArrayLike) -> Array:
     """Return the skew-symmetric matrix of a vector: hat_so3(w) @ x = w × x.
 
@@ -40,10 +50,6 @@ def hat_so3(w: ArrayLike) -> Array:
     ----------
     w : array_like, shape (..., 3)
         Vectors.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
 
     Examples
     --------
@@ -55,6 +61,7 @@ def hat_so3(w: ArrayLike) -> Array:
     return hat(as_finite("w", w, 3))
 
 
+@described_by(returns="(..., 3)")
 def vee_so3(W: ArrayLike) -> Array:
     """Return the vector of the skew-symmetric part (W − Wᵀ)/2: the inverse of `hat_so3`.
 
@@ -65,10 +72,6 @@ def vee_so3(W: ArrayLike) -> Array:
     W : array_like, shape (..., 3, 3)
         Matrices, of which only the skew-symmetric part matters.
 
-    Returns
-    -------
-    ndarray, shape (..., 3)
-
     Examples
     --------
     >>> vee_so3(hat_so3([1, 2, 3]))
@@ -77,21 +80,13 @@ def vee_so3(W: ArrayLike) -> Array:
     return vee(as_finite("W", W, 3, 3))
 
 
+@described_by(__doc__, returns="(..., 3, 3)")
 def exp_so3(w: ArrayLike) -> Array:
     """Return the rotation by ‖w‖ about w: I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a.
 
     Rodrigues' formula is accurate to a few eps (1 + a). The result is a rotation for every a, but
     for a > 1/eps, no digit is significant. There is no singular set; w = 0 gives I exactly.
     Source: BK 2.5.
-
-    Parameters
-    ----------
-    w : array_like, shape (..., 3)
-        Rotation vectors, in rad.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
 
     Examples
     --------
@@ -104,6 +99,7 @@ def exp_so3(w: ArrayLike) -> Array:
     return np.eye(3) + np.sin(angle) * N + 2 * np.sin(angle / 2) ** 2 * N @ N
 
 
+@described_by(__doc__, returns="(..., 3)")
 def log_so3(R: ArrayLike) -> Array:
     """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, up to rounding.
 
@@ -111,15 +107,6 @@ def log_so3(R: ArrayLike) -> Array:
     w and −w are equally short. The sign is then chosen so that the component of largest magnitude
     is positive (see `canonical_quaternion`).
     Source: BK 2.5.
-
-    Parameters
-    ----------
-    R : array_like, shape (..., 3, 3)
-        Rotation matrices.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
 
     Examples
     --------
@@ -159,17 +146,13 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     return np.linalg.norm(log(np.swapaxes(R, -1, -2) @ S), axis=-1)
 
 
+@described_by(__doc__)
 def right_jacobian_so3(w: ArrayLike) -> Array:
     """Return the matrix J for which J w' is the body angular velocity along exp_so3(w(t)).
 
     The transpose of J is the left Jacobian, which gives the angular velocity in the fixed frame.
     Singular set: J is smooth, but has rank 1 if ‖w‖ = 2π, 4π, …
     Source: BK 2.5.
-
-    Parameters
-    ----------
-    w : array_like, shape (..., 3)
-        Rotation vectors, in rad.
 
     Returns
     -------
@@ -185,17 +168,13 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     return np.eye(3) - np.sin(angle / 2) * sinc(angle / 2) * N + (1 - sinc(angle)) * N @ N
 
 
+@described_by(__doc__)
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     """Return the inverse of `right_jacobian_so3`, which maps body angular velocities to w'.
 
     Singular set: ‖w‖ = 2π, 4π, …. J then has no inverse, and the result is finite and huge. Near
     this set, the entries are inversely proportional to the distance from it.
     Source: BK 2.5.
-
-    Parameters
-    ----------
-    w : array_like, shape (..., 3)
-        Rotation vectors, in rad.
 
     Returns
     -------

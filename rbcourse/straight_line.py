@@ -93,8 +93,6 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     ----------
     t : array_like, shape (...)
         Times in [0, 1].
-    angle, order
-        As for `theta`.
 
     Returns
     -------

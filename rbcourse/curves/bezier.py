@@ -45,13 +45,9 @@ def bezier(
 
     Parameters
     ----------
-    start, goal, v0, v1
-        As for `projected_cubic`.
     long : bool, optional
         Whether the middle leg turns the other way round. If the end velocities are large, this
         curve may cost less.
-    duration
-        As for `projected_cubic`.
 
     Returns
     -------
@@ -99,11 +95,6 @@ def cumulative_bezier(
     Source: BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit
     quaternion curves with simple high order derivatives, SIGGRAPH 1995.
 
-    Parameters
-    ----------
-    start, goal, v0, v1, duration
-        As for `projected_cubic`.
-
     Returns
     -------
     Curve
@@ -142,11 +133,6 @@ def corrected_bezier(
     """Return the Bézier curve minus its leading deviation from the optimum.
 
     Source: beyond BK 10.
-
-    Parameters
-    ----------
-    start, goal, v0, v1, duration
-        As for `projected_cubic`.
 
     Returns
     -------

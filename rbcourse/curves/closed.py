@@ -55,12 +55,8 @@ def exponential_cubic(
 
     Parameters
     ----------
-    start, goal, v0, v1
-        As for `projected_cubic`.
     long : bool, optional
         Whether the curve turns the other way round, by 2π − ‖log_so3(R0ᵀ R1)‖.
-    duration
-        As for `projected_cubic`.
 
     Returns
     -------
@@ -99,11 +95,6 @@ def quaternion_cubic(
     """Return the cubic in R⁴ with these ends, projected onto the unit quaternions.
 
     Source: BK 1, its references 6 and 7; BK Remark 7.
-
-    Parameters
-    ----------
-    start, goal, v0, v1, duration
-        As for `projected_cubic`.
 
     Returns
     -------
@@ -158,11 +149,6 @@ def cayley_cubic(
 
     Source: BK 1, its reference 8.
 
-    Parameters
-    ----------
-    start, goal, v0, v1, duration
-        As for `projected_cubic`.
-
     Returns
     -------
     Curve
@@ -212,12 +198,8 @@ def normal_cubic(
 
     Parameters
     ----------
-    start, goal, v0, v1
-        As for `projected_cubic`.
     body : Body
         The body that moves.
-    duration
-        As for `projected_cubic`.
 
     Returns
     -------
@@ -279,11 +261,6 @@ def exponential_quintic(
     """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a quintic.
 
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
-
-    Parameters
-    ----------
-    start, goal, v0, v1, a0, a1, duration
-        As for `projected_quintic`.
 
     Returns
     -------

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_unit
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array
 from rbcourse.curves.curve import Curve, identity, weighted_sums
 from rbcourse.curves.ends import Given, between
@@ -71,6 +72,7 @@ def geodesic_data(given: Given) -> tuple[Array, Array]:
     return turn, np.stack([R0, swept, swept @ K], axis=-3)
 
 
+@described_by(geodesic)
 def screw(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
     """Return the screw motion between two poses, which has one fixed axis and a constant twist.
 
@@ -84,8 +86,6 @@ def screw(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) -> Sc
     ----------
     start, goal : array_like, shape (..., 4, 4)
         Poses A0 and A1.
-    duration : array_like, shape (...), optional
-        The duration of the motion.
 
     Returns
     -------

@@ -8,6 +8,7 @@ from functools import cache, cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rbcourse._docs import described_by
 from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import BLOCK, Array, blocks, cross
@@ -195,6 +196,7 @@ def projected_cubic(
     return moving(given, watched(curve))
 
 
+@described_by(projected_cubic)
 def projected_quintic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -211,16 +213,9 @@ def projected_quintic(
 
     Parameters
     ----------
-    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotation matrices, or poses.
-    v0, v1 : array_like, shape (..., 3) or (..., 6), optional
-        Angular velocities w, or twists (ω, v), at both ends, in the body frame. The default is
-        rest.
     a0, a1 : array_like, shape (..., 3) or (..., 6), optional
         Accelerations at both ends as ``c(t, 2)`` returns them: w', or (w', Rᵀ d''), per unit time
         squared. The default is 0.
-    duration : array_like, shape (...), optional
-        The duration of the motion.
 
     Returns
     -------

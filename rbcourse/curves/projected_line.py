@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_angle, as_array
+from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array
 from rbcourse.curves.curve import Curve, check_defined, identity, near_margins, which_curve
 from rbcourse.curves.ends import Given, between
-from rbcourse.curves.geodesics import AlongGeodesic, geodesic_data
+from rbcourse.curves.geodesics import AlongGeodesic, geodesic, geodesic_data
 from rbcourse.curves.rigid import moving
 from rbcourse.projection import NOT_UNIQUE, warn_if_nearly_singular
 from rbcourse.straight_line import f as straight_line_f
@@ -98,12 +99,9 @@ class ProjectedLine(AlongGeodesic):
         return near_margins(super().breakpoints, 0.5, self.margin)
 
 
+@described_by(geodesic)
 def projected_line(
-    start: ArrayLike,
-    goal: ArrayLike,
-    f: Progress | None = None,
-    *,
-    duration: ArrayLike = 1.0,
+    start: ArrayLike, goal: ArrayLike, f: Progress | None = None, *, duration: ArrayLike = 1.0
 ) -> Curve:
     """Return the projection of the line R0 + (R1 − R0) f(t) on SO(3): R0 exp(σ̂ θ(f(t))).
 
@@ -111,15 +109,11 @@ def projected_line(
 
     Parameters
     ----------
-    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotation matrices, or poses.
     f : callable, optional
         For order 0, ``f(t, order)`` returns the position on the line at time t, with f(0) = 0 and
         f(1) = 1 up to 1e-12. For orders 1 and 2, it returns the derivatives. The jerk ``c(t, 3)``
         also needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch
         axis. By default f(t) = t.
-    duration : array_like, shape (...), optional
-        The duration of the motion.
 
     Returns
     -------
