@@ -59,12 +59,6 @@ from typing import TYPE_CHECKING, Any
 from rbcourse._migration import RENAMED
 from rbcourse._numerics import Array
 from rbcourse.body import Body
-from rbcourse.conversions import (
-    matrix_from_quaternion,
-    matrix_from_zyx,
-    quaternion_from_matrix,
-    zyx_from_matrix,
-)
 from rbcourse.curves.chain import Chain, chain, joined, projected_spline, quaternion_spline
 from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
 from rbcourse.curves.curve import Curve
@@ -84,7 +78,13 @@ from rbcourse.optimum import (
     minimum_torque_spline,
 )
 from rbcourse.projection import distance_to_so, is_se, is_so, project_se, project_so
-from rbcourse.quaternion import slerp
+from rbcourse.quaternion import (
+    matrix_from_quaternion,
+    matrix_from_zyx,
+    quaternion_from_matrix,
+    slerp,
+    zyx_from_matrix,
+)
 from rbcourse.sampling import sample_quaternion, sample_rotation
 from rbcourse.se3 import (
     adjoint_se3,

@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from inspect import cleandoc, signature
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -31,10 +33,14 @@ def described_by(
     def complete(function: Function) -> Function:
         if function.__doc__ is None:  # python -OO
             return function
-        text, known = cleandoc(function.__doc__) + "\n", dict[str, str]()
+        text, known = cleandoc(function.__doc__) + "\n", dict[str, tuple[str, str]]()
         for one in (*sources, function):
             known |= _described(one.__doc__ if callable(one) else one)
-        entries = dict.fromkeys(known[name] for name in signature(function).parameters)
+        wanted = (known[name] for name in signature(function).parameters if name != "self")
+        entries = (
+            ", ".join(name for name, _ in group) + entry
+            for entry, group in groupby(wanted, itemgetter(1))
+        )
         place = next(_SECTION.finditer(text))
         before, after = text[: place.start()].rstrip(), result + text[place.end() :]
         function.__doc__ = f"{before}\n\nParameters\n----------\n{''.join(entries)}\n{after}"
@@ -49,12 +55,13 @@ def described_together(module_doc: str | None, *functions: Callable[..., Any]) -
         described_by(module_doc)(one)
 
 
-def _described(docstring: str | None) -> dict[str, str]:
-    """Return the entries of the section "Parameters" of a docstring, by the names of parameters."""
+def _described(docstring: str | None) -> dict[str, tuple[str, str]]:
+    """Return the name as written, and the entry, of each parameter that a docstring describes."""
     found = next(_SECTION.finditer(cleandoc(docstring or "") + "\n"))
     return {
-        name.strip(" *"): f"{head}\n{text.rstrip()}\n"
+        name.strip(" *"): (name.strip(), f"{colon}{kind}\n{text.rstrip()}\n")
         for head, text in _ENTRY.findall(found[1] or "")
         if not text.lstrip().startswith("As for ")
-        for name in head.split(" : ")[0].split(",")
+        for names, colon, kind in [head.partition(" : ")]
+        for name in names.split(",")
     }

@@ -8,14 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import (
-    as_finite,
-    as_inertia,
-    as_positive,
-    as_single,
-    check_all,
-    first_index,
-)
+from rbcourse._checks import as_finite, as_inertia, as_positive, as_single, check_all, first_index
 from rbcourse._numerics import EPS, Array, scaled
 
 __all__ = ["Body"]

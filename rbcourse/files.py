@@ -16,18 +16,16 @@ from numpy.typing import ArrayLike
 
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array
-from rbcourse.conversions import matrix_from_quaternion, quaternion_from_matrix
 from rbcourse.planar import Commands, Plan, as_command, as_plan
-from rbcourse.quaternion import continuous_quaternions, project_quaternion
+from rbcourse.quaternion import (
+    continuous_quaternions,
+    matrix_from_quaternion,
+    project_quaternion,
+    quaternion_from_matrix,
+)
 from rbcourse.se3 import check_path, join
 
-__all__ = [
-    "load_plan",
-    "read_path",
-    "replace_file",
-    "save_plan",
-    "write_path",
-]
+__all__ = ["load_plan", "read_path", "replace_file", "save_plan", "write_path"]
 
 Lines: TypeAlias = list[tuple[str, str]]
 File: TypeAlias = str | os.PathLike[str]

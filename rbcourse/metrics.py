@@ -9,12 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import (
-    as_finite,
-    as_positive,
-    as_symmetric,
-    check_broadcast,
-)
+from rbcourse._checks import as_finite, as_positive, as_symmetric, check_broadcast
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse._valid import as_rotations_or_poses

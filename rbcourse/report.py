@@ -57,14 +57,18 @@ from rbcourse._checks import Rng, as_count, as_generator, as_single, as_toleranc
 from rbcourse._docs import described_together
 from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
-from rbcourse.conversions import rotation_vector_from_quaternion
 from rbcourse.draw.animate import Animation, Update, animate
 from rbcourse.draw.arm import describe_arm, moving_arm
 from rbcourse.draw.plane import describe_route, extent_of, moving_route
 from rbcourse.draw.spheres import describe_images, moving_images
 from rbcourse.planar import Plan, as_states, interpolate_planar, propagate_planar
 from rbcourse.projection import is_se, is_so, project_se, project_so
-from rbcourse.quaternion import is_unit_quaternion, project_quaternion, rotate_by_quaternion
+from rbcourse.quaternion import (
+    is_unit_quaternion,
+    project_quaternion,
+    rotate_by_quaternion,
+    rotation_vector_from_quaternion,
+)
 from rbcourse.sampling import (
     sample_quaternion,
     sample_quaternion_naive,

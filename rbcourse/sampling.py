@@ -17,7 +17,7 @@ from rbcourse._checks import Rng, as_angle, as_generator, as_size, as_within_uni
 from rbcourse._docs import described_by
 from rbcourse._numerics import BLOCK, Array, blocks, sine_gap_ratio
 from rbcourse._valid import as_rotations
-from rbcourse.conversions import matrix_from_zyx, quaternion_from_zyx
+from rbcourse.quaternion import matrix_from_zyx, quaternion_from_zyx
 
 __all__ = [
     "Rng",

@@ -13,7 +13,7 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse import _taylor as jets
+from rbcourse import _quaternions as jets
 from rbcourse._hermite import hermite
 
 EPS = np.finfo(float).eps

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.conversions import quaternion_from_zyx, zyx_from_quaternion
+from rbcourse.quaternion import quaternion_from_zyx, zyx_from_quaternion
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(2026)

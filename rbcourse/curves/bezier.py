@@ -10,20 +10,16 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import first_index
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
-from rbcourse._quaternions import quaternion_of
-from rbcourse._taylor import (
-    Jet,
-    exp,
-    product,
-    slerp,
-    times,
-)
-from rbcourse.conversions import quaternion_from_rotation_vector
+from rbcourse._quaternions import Jet, exp, product, quaternion_of, slerp, times
 from rbcourse.curves.curve import Curve, QuaternionCurve, identity, other_way
 from rbcourse.curves.ends import Ends, Given, Rate, between
 from rbcourse.curves.projected import projected_cubic
 from rbcourse.curves.rigid import moving
-from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
+from rbcourse.quaternion import (
+    quaternion_conjugate,
+    quaternion_from_rotation_vector,
+    quaternion_multiply,
+)
 from rbcourse.so3 import exp_so3, log
 
 Legs = tuple[Array, Array, Array]

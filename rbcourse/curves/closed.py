@@ -13,13 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array, matvec
-from rbcourse._quaternions import quaternion_of
-from rbcourse._taylor import (
-    Jet,
-    angular_velocity,
-    cross,
-    exp,
-)
+from rbcourse._quaternions import Jet, angular_velocity, cross, exp, quaternion_of
 from rbcourse.body import Body
 from rbcourse.curves.curve import (
     Curve,

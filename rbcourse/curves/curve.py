@@ -11,16 +11,10 @@ from typing import Any, Literal, NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._checks import (
-    as_array,
-    as_duration,
-    as_time,
-    check_broadcast,
-    check_order,
-)
+from rbcourse._checks import as_array, as_duration, as_time, check_broadcast, check_order
 from rbcourse._hermite import hermite
 from rbcourse._numerics import BLOCK, Array, blocks, cross
-from rbcourse._taylor import Jet, angular_velocity, multiply, rotation
+from rbcourse._quaternions import Jet, angular_velocity, multiply, rotation
 from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import Body
 from rbcourse.curves._html import curve_html

@@ -13,13 +13,7 @@ from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse.body import Body, weight_of
-from rbcourse.curves.curve import (
-    Curve,
-    SingularTime,
-    check_defined,
-    least_over_time,
-    near_margins,
-)
+from rbcourse.curves.curve import Curve, SingularTime, check_defined, least_over_time, near_margins
 from rbcourse.curves.ends import Ends, Rate, between
 from rbcourse.curves.rigid import moving
 from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singular
