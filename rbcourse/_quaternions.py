@@ -1,7 +1,7 @@
 """Quaternions (w, x, y, z) without checks: conversions, and functions of time with derivatives.
 
-A jet lists the values of a function of time and of its derivatives: [x, x', x'', x'''] or fewer.
-The first axis indexes the components: a quaternion has the shape (4, ...), a vector (3, ...).
+A jet lists the values of a function of time and of its derivatives: [x, x', x'', x'''] or fewer. In
+jets, the first axis indexes the components: a quaternion has the shape (4, ...), a vector (3, ...).
 """
 
 import math
