@@ -5,7 +5,7 @@ The quaternions q and −q give the same rotation.
 Parameters
 ----------
 q : array_like, shape (..., 4)
-    Unit quaternions.
+    Unit quaternions (w, x, y, z). (SciPy's ``as_quat()`` returns (x, y, z, w).)
 R : array_like, shape (..., 3, 3)
     Rotation matrices.
 w : array_like, shape (..., 3)

@@ -28,8 +28,9 @@ def stationary(what, R, ends, G=BOOK, accelerations=(REST, REST)):
         task = body(one, G[None], of_torque=True)
     else:
         task = ball(one)
-    found = task.solver(task.equations, R[None])
-    return optimum_of(task.functional, task.equations.ends, found, np.ones(1), rb.Body(G))
+    equations = task.equations
+    found = task.solver(equations, R[None])
+    return optimum_of(equations.functional, equations.ends, found, np.ones(1), rb.Body(G))
 
 
 def upright(what, angle):

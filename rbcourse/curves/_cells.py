@@ -10,9 +10,9 @@ Since the limits of a cell are convex, this timing satisfies them, if any timing
 paths, it takes at most 2e-5 longer than the optimum of a cone program with limits only at the ends
 of the same cells.
 
-Of two similar methods, only the abstracts or introductions were read: Pham and Pham (TOPP-RA, IEEE
-Transactions on Robotics 34, 2018) make two passes of linear programs for joints; Nguyen and Pham
-(Journal of Guidance, Control, and Dynamics, 2016) compute timings of rotations.
+Similar methods, of which only abstracts or introductions were read: Pham and Pham (TOPP-RA, IEEE
+Transactions on Robotics 34, 2018; two passes of linear programs for joints), Nguyen and Pham
+(Journal of Guidance, Control, and Dynamics, 2016; rotations).
 """
 
 from __future__ import annotations
@@ -72,14 +72,9 @@ CONTROL = np.array([[1, 0, 0], [-0.5, 2, -0.5], [0, 0, 1]])
 class Limit:
     """The limit ‖a u + b x + k‖ ≤ 1 on the norm of a vector, or on each of its three components.
 
-    With V = c(s, 1) = (ω, v) and A = c(s, 2) = (α, β), the motion has the velocity V s' and the
-    acceleration V u + A x in the body frame. The other vectors are
-
-    - the torque G ω u + (G α + ω × G ω) x;
-    - the acceleration (v + ω × r) u + (β + α × r + ω × (ω × r)) x of the point r of the body;
-    - the force on a mass m at this point, m times its acceleration, minus m Rᵀ g.
-
-    For a limit on a speed, a = k = 0, and b is the square of the share that is used at s' = 1.
+    The motion has the velocity V s' and the acceleration V u + A x in the body frame, with
+    V = c(s, 1) and A = c(s, 2). For a limit on a speed, a = k = 0, and b is the square of the share
+    that is used at s' = 1.
     """
 
     name: str
@@ -89,7 +84,6 @@ class Limit:
 
     @property
     def of_speed(self) -> bool:
-        """Whether the vector is a velocity."""
         return self.name in SPEEDS
 
     def vectors(self, V: Array, A: Array, R: Array) -> Triple:
@@ -105,7 +99,7 @@ class Limit:
         return a, b, k
 
     def _quantity(self, V: Array, A: Array, R: Array) -> Triple:
-        """Return a, b and k for the limited vector itself, each of shape (..., 3)."""
+        """Return a, b and k of the vector itself, such as the torque, each of shape (..., 3)."""
         G, m, r = self.body.inertia, self.body.mass, self.body.centre
         w = V[..., :3]
         w_rate = A[..., :3]
@@ -204,7 +198,6 @@ class Path:
     fine: Flags  # whether cells are smaller towards this end, shape (2, L)
 
     def cell_counts(self) -> Counts:
-        """Return the number of cells of each leg."""
         legs = int(np.count_nonzero(self.moves))
         most = max(PATH // legs, min(MOST_IN_LEG, CHAIN // legs), USUAL_IN_LEG)
         least = max(PATH // legs, LEAST_IN_LEG)
@@ -223,7 +216,10 @@ class Path:
 
 def _surveyed(curve: Curve, ends: Array) -> Path:
     """Return the legs of a path, and its stops; `ends` are the values of x at both ends."""
-    legs, knots = _legs(curve)
+    if isinstance(curve, Chain):
+        legs, knots = curve.legs.flat, curve.times
+    else:
+        legs, knots = curve.flat, np.array(curve.domain)
     V, A, unit = _sampled(legs)
     h = legs.duration[:, None]
     speed = np.abs(V).max(axis=-1) * h
@@ -238,7 +234,7 @@ def _surveyed(curve: Curve, ends: Array) -> Path:
     stops = _stops(V, resting, moves)
     return Path(
         legs=legs,
-        knots=knots,
+        knots=knots - knots[0],
         moves=moves,
         rests=rests,
         change=_change(V),
@@ -247,18 +243,11 @@ def _surveyed(curve: Curve, ends: Array) -> Path:
     )
 
 
-def _legs(curve: Curve) -> tuple[Curve, Array]:
-    """Return the legs in a flat stack, and their ends from the time 0 on."""
-    if isinstance(curve, Chain):
-        return curve.legs.flat, curve.times - curve.times[0]
-    return curve.flat, np.array(curve.domain) - curve.domain[0]
-
-
 def _sampled(legs: Curve) -> Triple:
-    """Return velocities, accelerations, shape (5, L, parts, 3), and their units, shape (parts,).
+    """Return velocities and accelerations at five places of each leg, and their units.
 
-    They are at five places of each leg. The parts are the rotation and the position; their units
-    are an angle of 1 and the largest coordinate.
+    The shapes are (5, L, parts, 3) and (parts,). The parts are the rotation and the position; their
+    units are an angle of 1 and the largest coordinate.
     """
     t = np.linspace(0, 1, 5)[:, None] * legs.duration
     shape = 5, legs.count, -1, 3
@@ -312,10 +301,7 @@ def _fine_ends(stops: Flags, moves: Flags, slow: Flags) -> Flags:
 
 
 class Cells:
-    """The cells of the moving legs.
-
-    Each cell has its leg, its start s, its length h, and its ends as shares of the leg.
-    """
+    """The cells of the moving legs: their legs, starts s, lengths h, and ends as shares of legs."""
 
     def __init__(self, path: Path, counts: Counts, limits: list[Limit]) -> None:
         self.path = path
@@ -340,7 +326,6 @@ class Cells:
         self.ellipses = lru_cache(maxsize=4)(self._ellipses)  # each pass needs all of them
 
     def near(self, cell: np.intp | int) -> str:
-        """Return the place of a cell, for messages."""
         return f"near s = {self.s[cell]:.6g}"
 
     def _sampled(self, part: slice, places: Array) -> Triple:
@@ -362,8 +347,7 @@ class Cells:
         Their shape is (6, cells, ellipses). The vector a u + b x + k is replaced by the quadratic
         polynomial with the same values at the places. It lies in the convex hull of its Bernstein
         coefficients p x + q y + k, so that the limit holds in the whole cell if it holds for them.
-        Since a, b and k may jump between cells, their values inside the cell are used. In cells
-        near rest, where b changes much, limits on speeds use its largest value in the cell.
+        In cells near rest, where b changes much, limits on speeds use its largest value.
         """
         part = slice(start, stop)
         V, A, R = self._sampled(part, PLACES)
@@ -373,7 +357,6 @@ class Cells:
         return np.concatenate(made, axis=1).swapaxes(1, 2)
 
     def _ellipses_of(self, limit: Limit, vectors: Triple, part: slice) -> Array:
-        """Return the coefficients for one limit, shape (6, ellipses, cells)."""
         a, b, k = vectors
         held = np.linalg.norm(k, axis=-1).max(axis=(0, 2))
         if held.max() >= 1:
@@ -398,7 +381,7 @@ class Cells:
         return np.stack(coefficients).swapaxes(2, 3).reshape(6, -1, len(held))
 
     def largest_shares(self, x: Array, y: Array) -> Array:
-        """Return, for each cell, the largest share of a limit at the places that are checked."""
+        """Return, for each cell, the largest share of a limit at the places `CHECKED`."""
         largest = np.zeros(len(x))
         place = CHECKED[:, None, None, None]
         for part in reported("fastest, check", list(blocks(len(x), BLOCK))):
@@ -414,7 +397,6 @@ class Cells:
         return largest
 
     def motion(self, x: Array, y: Array) -> Triple:
-        """Return the grid points, and s' and the times there; each piece has a point at its end."""
         last = np.array(list(self.ends))
         s = np.insert(self.s, last + 1, self.path.knots[self.leg[last] + 1])
         start = np.sqrt(x)
@@ -430,7 +412,6 @@ class Cells:
 
 
 def _check_memory(cells: int) -> None:
-    """Raise MemoryError if the cells of a path need more memory than the computer has."""
     pages = getattr(os, "sysconf_names", {}).get("SC_PHYS_PAGES")
     most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if pages else 2**33
     if cells * MEMORY > most:
@@ -441,7 +422,7 @@ def _check_memory(cells: int) -> None:
 
 
 def _graded(even: Array, fine: Flags) -> Array:
-    """Return the ends of cells, given as shares of their legs, with smaller cells at fine ends."""
+    """Return the ends of cells, as shares of their legs, with smaller cells at fine ends."""
     start, end = fine
     from_start = even**2
     to_end = 1 - (1 - even) ** 2
@@ -505,7 +486,7 @@ def _forward(cells: Cells, low: Array, high: Array) -> tuple[Array, Array]:
 
 
 def _span(x: float) -> tuple[float, float]:
-    """Return the least and the largest x at a stop, where infinity means that x is free."""
+    """Return the least and the largest x at a stop; x is free if it is infinite."""
     return (x, x) if x < inf else (0.0, inf)
 
 
@@ -537,9 +518,8 @@ def _largest(ellipses: list[list[float]], y: float) -> float:
 def _tops(Q: Array) -> Array:
     """Return, for each cell, the y with the largest x + y, where x is as large as y allows.
 
-    Near the top of an ellipse, x grows only if y decreases. TOPP-RA chooses the largest x, which is
-    not the best choice there, since a small gain of x causes a large loss of y. The time depends
-    nearly equally on x and y. The y is found by bisection of its logarithm.
+    Near the top of an ellipse, a small gain of x causes a large loss of y, on which the time
+    depends nearly equally. The y is found by bisection of its logarithm.
     """
     low = np.full((Q.shape[1], 1), 1e-60)
     high = np.full((Q.shape[1], 1), 1e60)

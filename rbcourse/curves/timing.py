@@ -1,8 +1,6 @@
-"""The fastest timing of a path under limits on speeds, accelerations, torque and force.
+"""The fastest timing s(t) of a path c(s) under limits on speeds, accelerations, torque and force.
 
-The timing s(t) moves the body along a path c(s). With x = s'² and u = s'' = ½ dx/ds, every limit
-has the form ‖a u + b x + k‖ ≤ 1, where a, b and k depend on s. The private module `_cells` divides
-the path into cells, and finds the largest x by two passes over the cells.
+The private module `_cells` has the method.
 """
 
 from __future__ import annotations
@@ -107,13 +105,11 @@ def fastest(
     -----
     At least one limit on an acceleration, the torque or the force is required.
 
-    The grid has 1,000 cells or, for a chain, 250 for each leg. If there are many legs, each has 25
-    cells, 50 next to a stop, or as few as 4 if its velocity hardly changes. A leg in which a limit
-    is exceeded by more than 1e-4 gets twice as many cells, up to three times. T is then about 1e-3
-    above the shortest time; for some paths with many legs, it is 5e-3 above, and up to 2e-2
-    if the legs are quintics from rest to rest. The calculation takes about 50 ms for 1,000 cells,
-    and a time and a memory in proportion for more. If it takes more than 10 s, lines on stderr show
-    its progress.
+    The grid has 1,000 cells or, for a chain, from 250 to 4 for each leg, and more if a limit is
+    exceeded. T is then about 1e-3 above the shortest time; for some paths with many legs, it is
+    5e-3 above, and up to 2e-2 if the legs are quintics from rest to rest. The calculation takes
+    about 50 ms for 1,000 cells, and a time and a memory in proportion for more. If it takes more
+    than 10 s, lines on stderr show its progress.
 
     The result depends only on the path: neither a shift of its times nor another unit of time
     changes T. The motion stops where the path rests or its velocity jumps, and legs in which the
@@ -192,7 +188,6 @@ def _moments(curve: Curve) -> Array:
 
 
 def _shares(curve: Curve, limits: list[Limit], t: Array) -> dict[str, Array]:
-    """Return the shares of the limits that the curve uses at the times t."""
     shares: dict[str, Array] = {limit.name: np.empty(len(t)) for limit in limits}
     for part in blocks(len(t), BLOCK):
         V = curve(t[part], 1)
@@ -238,7 +233,7 @@ class Timed(Curve):
 
     @property
     def size(self) -> int:
-        """The size of the curve's matrices: 3 on SO(3), 4 on SE(3)."""
+        """3 on SO(3), 4 on SE(3)."""
         return self.curve.size
 
     def lasting(self, duration: Array) -> Self:

@@ -1,21 +1,22 @@
 """Newton's method for optima between two poses, with values at Chebyshev nodes as unknowns.
 
-The unknowns are R and the highest derivative k = w⁽ᵐ⁾ at the nodes, and the constant c. With
+The unknowns are R and the highest derivative k = w⁽ᵐ⁾ at the nodes, and the constant c. The
+equations are
 
     R = R0 + ∫ R ŵ dt,    R(1) = R1,    p(w, w', …, k) = Rᵀ c,
 
-the curve is stationary. Here w, w', … are integrals of k plus polynomials that give the end values.
-A Newton step turns R by ε in the fixed frame, and changes k and c. To first order,
+where w, w', … are integrals of k plus polynomials that give the end values. A Newton step turns R
+by ε in the fixed frame, and changes k and c. To first order,
 
     ε = d + ∫ R δw dt,    ε(1) = 0,    p + δp = Rᵀ(c + ĉ ε + δc),
 
-where d corrects the error of the first equation. `Stationary` is this linear system for any
-functional, and `BallStationary` is a smaller one for a ball. The method works on few nodes until
-the steps are short, and then on more nodes until the last Chebyshev coefficients have decayed.
+where d corrects the error of the first equation. The method works on few nodes until the steps are
+short, and then on more nodes until the last Chebyshev coefficients have decayed.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from functools import lru_cache
 from typing import Any, NamedTuple, Self, TypeAlias, TypeVar
 
@@ -39,7 +40,6 @@ UNRESOLVED = 1e3  # steps shorter than this many last coefficients do not improv
 STALLED = 1e-6  # rad: if a step shorter than this does not halve the residual, rounding prevents it
 Numbers: TypeAlias = NDArray[np.intp]
 Record = TypeVar("Record", bound=NamedTuple)
-Equations: TypeAlias = "Stationary"  # or its subclass
 
 
 class Solution(NamedTuple):
@@ -66,29 +66,30 @@ class Failure(NamedTuple):
 
     @property
     def cost(self) -> float:
-        """The cost, which is infinite."""
         return np.inf
 
 
-def relax(equations: Equations, R: Array) -> list[Solution | Failure]:
+Results: TypeAlias = list[Solution | Failure]
+
+
+def relax(equations: Stationary, R: Array) -> Results:
     """Solve problems by Newton's method, starting from rotations at nodes, (N, n, 3, 3).
 
     A problem that is singular or overflows gives a `Failure`.
     """
-    found: list[Solution | Failure] = []
+    found: Results = []
     for some in blocks(len(R), TOGETHER):
         found += _attempt(equations.take(some), R[some])
     return found
 
 
-def relax_ball(equations: BallStationary, R: Array) -> list[Solution | Failure]:
+def relax_ball(equations: BallStationary, R: Array) -> Results:
     """Solve problems of balls as `relax` does, with linear systems on the nodes of the given R."""
     ends = equations.R0, equations.R1, equations.ends
-    on_coarse = BallStationary(*ends, coarse=R.shape[1])
-    return relax(on_coarse, R)
+    return relax(BallStationary(*ends, coarse=R.shape[1]), R)
 
 
-def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
+def _attempt(equations: Stationary, R: Array) -> Results:
     """Solve a stack; if this raises an error, solve its problems one by one."""
     try:
         return _relax(equations, R)
@@ -99,8 +100,8 @@ def _attempt(equations: Equations, R: Array) -> list[Solution | Failure]:
     return [_attempt(equations.take(one), R[one])[0] for one in ones]
 
 
-def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
-    found: list[Solution | Failure] = [Failure(np.inf, 0)] * len(R)
+def _relax(equations: Stationary, R: Array) -> Results:
+    found: Results = [Failure(np.inf, 0)] * len(R)
     first = R.shape[1]
     number = np.arange(len(R))
     unknowns = equations.first(equations.with_ends(R))
@@ -108,8 +109,7 @@ def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
     for n in equations.nodes(first):
         some = equations.take(now.number)
         if n > first:
-            unknowns = some.refined(now.unknowns, n)
-            now = Iterates.start(unknowns, now.number, now.steps)
+            now = Iterates.start(some.refined(now.unknowns, n), now.number, now.steps)
         now = _newton(some, now, rough=n == first)
         _store(equations, now, found)
         now = take(now, now.finer)
@@ -118,7 +118,7 @@ def _relax(equations: Equations, R: Array) -> list[Solution | Failure]:
     return found
 
 
-def _newton(equations: Equations, now: Iterates, rough: bool) -> Iterates:
+def _newton(equations: Stationary, now: Iterates, rough: bool) -> Iterates:
     """Make steps on one set of nodes until each problem stops.
 
     If `rough`, a problem needs more nodes as soon as its steps are short.
@@ -145,16 +145,12 @@ def _newton(equations: Equations, now: Iterates, rough: bool) -> Iterates:
     return take(now, np.argsort(now.number))
 
 
-def _store(equations: Equations, now: Iterates, found: list[Solution | Failure]) -> None:
-    """Store the results of the problems that have stopped."""
-    left = now.left.tolist()
-    steps = now.steps.tolist()
-    for i, *failure in zip(now.number, left, steps, strict=True):
+def _store(equations: Stationary, now: Iterates, found: Results) -> None:
+    for i, *failure in zip(now.number, now.left.tolist(), now.steps.tolist(), strict=True):
         found[i] = Failure(*failure)
     done = take(now, now.solved)
     costs = equations.take(done.number).costs(done.k)
-    each = zip(done.number, *done.unknowns, costs.tolist(), strict=True)
-    for i, *solution in each:
+    for i, *solution in zip(done.number, *done.unknowns, costs.tolist(), strict=True):
         found[i] = Solution(*solution, *found[i])
 
 
@@ -171,9 +167,9 @@ def joined(records: list[Record]) -> Record:
 class Iterates(NamedTuple):
     """The state of Newton's method for a stack of problems on one set of nodes.
 
-    R, k and c are the unknowns. `number` is the index of a problem in the stack that `_relax`
-    solves, `left` its largest error, `turned` the largest turn of a node by its last step, and
-    `steps` the number of steps. A problem stops if it is `solved` or needs a `finer` set of nodes.
+    `number` is the index of a problem in the stack that `_relax` solves, `left` its largest error,
+    and `turned` the largest turn of a node by its last step. A problem stops if it is `solved` or
+    needs a `finer` set of nodes.
     """
 
     R: Array
@@ -195,7 +191,6 @@ class Iterates(NamedTuple):
 
     @property
     def unknowns(self) -> Unknowns:
-        """R, k and c."""
         return Unknowns(self.R, self.k, self.c)
 
     def judged(self, left: Array, tail: Array) -> Self:
@@ -210,7 +205,7 @@ class Iterates(NamedTuple):
         finer = (unresolved | stalled) & ~solved
         return self._replace(left=left, solved=solved, finer=finer)
 
-    def stepped(self, equations: Equations, step: Change) -> Self:
+    def stepped(self, equations: Stationary, step: Change) -> Self:
         """Return the state after a step, of which at most `LONGEST_STEP` is made."""
         turned = np.linalg.norm(step.turn, axis=-1).max(axis=1)
         share = LONGEST_STEP / np.maximum(turned, LONGEST_STEP)
@@ -250,8 +245,6 @@ class Stationary:
     """The equation R p = c for any functional, for a stack of problems.
 
     `ends` contains w0 and w1, and for the jerk also a0 and a1; its shape is (N, m, 3).
-
-    Source: beyond BK 2.
     """
 
     def __init__(self, functional: Functional, R0: Array, R1: Array, ends: Array) -> None:
@@ -262,9 +255,10 @@ class Stationary:
 
     def take(self, index: Any) -> Self:
         """Return the equations of some of the problems."""
-        functional = self.functional.take(index)
-        R0, R1 = self.R0[index], self.R1[index]
-        return type(self)(functional, R0, R1, self.ends[index])
+        some = copy(self)
+        some.functional = self.functional.take(index)
+        some.R0, some.R1, some.ends = self.R0[index], self.R1[index], self.ends[index]
+        return some
 
     def nodes(self, n: int) -> tuple[int, ...]:
         """Return the numbers of nodes on which to work: n, and those of `NODES` that are larger."""
@@ -276,9 +270,8 @@ class Stationary:
         The mean of R p would be a worse initial value of c.
         """
         by = primitives(R.shape[1], self.ends.shape[1])
-        lacking = velocity(R) - by.from_ends[0] @ self.ends
-        c = np.zeros((len(R), 3))
-        return Unknowns(R, by.fit @ lacking, c)
+        lacking = rates_of(R, 1)[0] - by.from_ends[0] @ self.ends
+        return Unknowns(R, by.fit @ lacking, c=np.zeros((len(R), 3)))
 
     def unknowns(self, R: Array, k: Array, c: Array) -> Unknowns:
         """Return the unknowns. If k depends on R and c, it is computed from them."""
@@ -292,13 +285,12 @@ class Stationary:
         return R
 
     def refined(self, now: Unknowns, n: int) -> Unknowns:
-        """Return the unknowns interpolated to n nodes; c does not depend on the nodes."""
+        """Return the unknowns interpolated to n nodes."""
         R = self.with_ends(on_nodes(now.R, n))
         k = interpolation(now.k.shape[1], n) @ now.k
         return self.unknowns(R, k, now.c)
 
     def stepped(self, now: Unknowns, step: Change, share: Array) -> Unknowns:
-        """Return the unknowns after a share of a step."""
         at_nodes = share[:, None, None]
         R = cayley(at_nodes * step.turn) @ now.R
         k = now.k + at_nodes * step.k
@@ -317,7 +309,7 @@ class Stationary:
         return Errors(np.maximum(_largest(E), relative), E, W, lacking)
 
     def tails(self, now: Unknowns) -> Array:
-        """Return the last coefficients of R or, if larger, the last relative coefficients of k."""
+        """Return the last coefficients of R or, if larger, those of k relative to its size."""
         size = 1 + _largest(now.k)
         return np.maximum(tails(now.R), tails(now.k) / (SHARE * size))
 
@@ -351,8 +343,7 @@ class Stationary:
         )
         size = dk.shape[1]
         turn = T.reshape(-1, size, size) @ dk
-        turn = d + turn.reshape(d.shape)
-        return Change(turn, dk.reshape(d.shape), dc)
+        return Change(d + turn.reshape(d.shape), dk.reshape(d.shape), dc)
 
     def known_turns(self, R: Array, errors: Errors, by_ends: bool) -> Array:
         """Return d and, if `by_ends`, also ∫ R δw dt for a unit change of each end value.
@@ -379,7 +370,7 @@ class Stationary:
 
 
 def _turns_by_k(R: Array, K: Array) -> Array:
-    """Return the matrices T of ∫ R K x dt for x at the nodes, shape (N, n, 3, 3 n)."""
+    """Return T of `Stationary.responses`, for x at the nodes, shape (N, n, 3, 3 n)."""
     count, n = R.shape[:2]
     entries = R.reshape(count, n, 9).mT
     T = (grid(n).integral * entries[:, :, None]) @ K
@@ -406,9 +397,7 @@ def _solve_blocks(A: Array, B: Array, C: Array, f: Array, g: Array) -> tuple[Arr
     matrix[:, :-3, :-3] = A.reshape(count, size, size)
     matrix[:, :-3, -3:] = B.reshape(count, size, 3)
     matrix[:, -3:, :-3] = C
-    f = f.reshape(count, size, -1)
-    right = np.append(f, g, axis=1)
-    both = solve(matrix, right)
+    both = solve(matrix, np.append(f.reshape(count, size, -1), g, axis=1))
     return both[:, :-3], both[:, -3:]
 
 
@@ -417,21 +406,13 @@ class BallStationary(Stationary):
 
     The linear systems are solved on a fixed number of nodes, `coarse`. This is 1.5 times as fast as
     `Stationary` for one problem, and 4.5 times as fast for stacks of 300.
-
-    Source: BK (19).
     """
 
     def __init__(self, R0: Array, R1: Array, ends: Array, coarse: int = 17) -> None:
         super().__init__(BallAcceleration(), R0, R1, ends)
         self.coarse = coarse
 
-    def take(self, index: Any) -> Self:
-        """Return the equations of some of the problems."""
-        R0, R1 = self.R0[index], self.R1[index]
-        return type(self)(R0, R1, self.ends[index], self.coarse)
-
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return the numbers of nodes for 1, 2, 4, 8 and 16 times as many intervals."""
         intervals = [(n - 1) * times for times in (1, 2, 4, 8, 16)]
         return tuple(1 + i for i in intervals if i <= MOST_INTERVALS)
 
@@ -439,30 +420,26 @@ class BallStationary(Stationary):
         """Return initial values: the given R, and the c for which w'' = Rᵀc fits w best."""
         count = len(R)
         by = primitives(R.shape[1], 2)
-        lacking = velocity(R) - by.from_ends[0] @ self.ends
+        lacking = rates_of(R, 1)[0] - by.from_ends[0] @ self.ends
         effect = along(by.from_k[0], R.mT).reshape(count, -1, 3)
         right = effect.mT @ lacking.reshape(count, -1, 1)
         c = solve(effect.mT @ effect, right)
         return self.unknowns(R, lacking, c[..., 0])
 
     def unknowns(self, R: Array, k: Array, c: Array) -> Unknowns:
-        """Return the unknowns, with Rᵀc instead of the given k."""
         return Unknowns(R, in_body(R, c), c)
 
     def errors(self, now: Unknowns) -> Errors:
         """Return the errors; only R0 + ∫ R ŵ dt − R is not 0."""
-        by = primitives(now.R.shape[1], 2)
-        w = by.from_ends[0] @ self.ends + by.from_k[0] @ now.k
-        W = hat(w)
+        W = hat(rates_at_nodes(self.ends, now.k)[0])
         E = self.R0[:, None] + integrals(now.R @ W) - now.R
         return Errors(_largest(E), E, W, np.zeros_like(now.k))
 
     def tails(self, now: Unknowns) -> Array:
-        """Return the last coefficients of R."""
         return tails(now.R)
 
     def responses(self, now: Unknowns, errors: Errors, by_ends: bool = False) -> Change:
-        """Return a Newton step and, if `by_ends`, the responses to a unit change of each end value.
+        """Return the result of `Stationary.responses` from smaller systems.
 
         Since w'' = Rᵀc, we have w = (1 − t) w0 + t w1 + K Rᵀc, and to first order
 
@@ -511,7 +488,6 @@ def _coarse_causes(R: Array, c: Array, d: Array) -> Array:
 
 
 def _system_across(R: Array, across: Array, ahead: Array) -> Array:
-    """Return the matrices of x − e · ∫ R K Rᵀ (c × e) x dt, shape (N, 2 n, 2 n)."""
     count, n = R.shape[:2]
     left = (across[:, None] @ R).reshape(count, 2 * n, 3)
     right = (-ahead.mT[:, None] @ R).reshape(count, 2 * n, 3)
@@ -556,9 +532,17 @@ def rates_at_nodes(ends: Array, k: Array) -> list[Array]:
     return [*(E @ ends + K @ k for E, K in integrals_of_k), k]
 
 
-def velocity(R: Array) -> Array:
-    """Return w at the nodes, from R at the nodes."""
-    return vee(R.mT @ along(grid(R.shape[1]).derivative, R))
+def rates_of(R: Array, count: int) -> list[Array]:
+    """Return `count` rates w, w', … at the nodes, from R at the nodes."""
+    return with_derivatives(vee(R.mT @ along(grid(R.shape[1]).derivative, R)), count - 1)
+
+
+def with_derivatives(values: Array, count: int) -> list[Array]:
+    """Return values at the nodes, shape (..., n, columns), and their first derivatives."""
+    found = [values]
+    for _ in range(count):
+        found.append(grid(values.shape[-2]).derivative @ found[-1])
+    return found
 
 
 def integrals(values: Array) -> Array:
@@ -568,8 +552,7 @@ def integrals(values: Array) -> Array:
 
 def in_body(R: Array, c: Array) -> Array:
     """Return Rᵀc at the nodes, shape (N, n, 3)."""
-    row = c[:, None, None]
-    return (row @ R)[:, :, 0]
+    return (c[:, None, None] @ R)[:, :, 0]
 
 
 def on_nodes(R: Array, n: int) -> Array:
@@ -593,5 +576,4 @@ def cayley(turn: Array) -> Array:
 
 def _largest(values: Array) -> Array:
     """Return the largest absolute entry of each problem."""
-    axes = tuple(range(1, values.ndim))
-    return np.asarray(np.abs(values).max(axis=axes))
+    return np.asarray(np.abs(values).max(axis=tuple(range(1, values.ndim))))

@@ -1,9 +1,7 @@
 """Starting curves of the search (`_search`), and Gauss–Newton steps that lower their costs.
 
-Newton's method finds a stationary curve near its start. So the search needs `Curves` with the given
-ends and a low cost ∫ ‖u‖² dt. `starts` and `between_free_motions` make such curves, and `spun` adds
-spin to curves of a body. `lowered` changes a curve R to R exp(η̂), with the η for which u, to first
-order in η, has the least integral of its square.
+`starts` and `between_free_motions` make curves with the given ends, `spun` adds spin to curves of a
+body, and `lowered` changes a curve R to R exp(η̂).
 """
 
 from __future__ import annotations
@@ -15,13 +13,13 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._chebyshev import along, chebyshev, grid
+from rbcourse._chebyshev import chebyshev, grid
 from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, matvec
 from rbcourse.curves.ends import Ends
 from rbcourse.curves.functionals import Functional
-from rbcourse.optimum._collocation import TOGETHER, cayley, on_nodes
-from rbcourse.so3 import exp_so3, hat, log, vee
+from rbcourse.optimum._collocation import TOGETHER, cayley, on_nodes, rates_of, with_derivatives
+from rbcourse.so3 import exp_so3, hat, log
 
 FAST = 4 * np.pi  # if ‖w0‖ + ‖w1‖ is larger, all four of the `starts` are used
 SHARES = np.array([1.0, 0.25, 3.0])  # multiples of a Gauss–Newton step; the best multiple is used
@@ -53,23 +51,19 @@ class Curves:
 
     @staticmethod
     def none(n: int) -> Curves:
-        """Return an empty set of curves on n nodes."""
         return Curves.of(np.empty(0, int), np.empty((0, n, 3, 3)))
 
     @property
     def nodes(self) -> int:
-        """The number of nodes."""
         return self.R.shape[1]
 
     def __len__(self) -> int:
         return len(self.R)
 
     def take(self, index: Any) -> Curves:
-        """Return the curves that a NumPy index selects."""
         return Curves(self.problem[index], self.R[index], self.cost[index])
 
     def joined(self, *others: Curves) -> Curves:
-        """Return these curves followed by others."""
         parts = [(one.problem, one.R, one.cost) for one in (self, *others)]
         return Curves(*map(np.concatenate, zip(*parts, strict=True)))
 
@@ -84,10 +78,9 @@ class Curves:
     def with_ends(self, ends: Array) -> Curves:
         """Multiply the curves by factors exp(η̂) that correct w0, w1 and, if given, a0, a1.
 
-        On too few nodes, the polynomials through R have other end velocities than w0 and w1; Δw₀
-        and Δw₁ are the differences. The factor for velocities has η = t (1 − t)² Δw₀ − t² (1 − t)
-        Δw₁. For accelerations, a second factor has η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁. The
-        values `ends` of all problems have the shape (…, 2, 3) or (…, 4, 3).
+        On too few nodes, the polynomials through R have other end velocities; Δw₀ and Δw₁ are the
+        differences. The first factor has η = t (1 − t)² Δw₀ − t² (1 − t) Δw₁. The second one has
+        η = ½ t² (1 − t)³ Δa₀ + ½ t³ (1 − t)² Δa₁. The shape of `ends` is (…, 2, 3) or (…, 4, 3).
         """
         t, R = grid(self.nodes).t[:, None], self.R
         for order in range(1, 1 + ends.shape[1] // 2):
@@ -109,9 +102,9 @@ class Curves:
 def starts(ends: Ends, n: int, *accelerations: Array) -> Curves:
     """Return two starting curves at n nodes for each problem, and two more if its ends are fast.
 
-    The curves turn the short way and the long way. They do not depend on the choice of frames. The
-    ends R1, R0, −w1, −w0 give the reversed curves. If all vectors are along one axis, the number of
-    full turns is the best one.
+    They turn the short way and the long way, and do not depend on the choice of frames. The ends
+    R1, R0, −w1, −w0 give the reversed curves. If all vectors are along one axis, the number of full
+    turns is the best one.
     """
     speeds = np.linalg.norm([ends.w0, ends.w1, *(a / 2 for a in accelerations)], axis=-1)
     fast = speeds.sum(axis=0) > FAST
@@ -203,12 +196,8 @@ def between_free_motions(ends: Ends, G: Array, n: int) -> Curves:
 
     For a body of inertia G, let F be the free motion that starts at R0 with w0, and let B be the
     free motion that arrives at R1 with w1. With β = 3t² − 2t³ and a logarithm v of FᵀB that is
-    continuous in time, the curve
-
-        R = F exp(β v̂)
-
-    has the given ends. At t = ½, one v is the shortest logarithm, and the other v turns the other
-    way round. The logarithms are computed at 2 n − 1 nodes; every second one is a node of R.
+    continuous in time (`_continuous_log`), the curve R = F exp(β v̂) has the given ends. The
+    logarithms are computed at 2 n − 1 nodes; every second one is a node of R.
     """
     R0 = np.stack([ends.R0, ends.R1])
     w0 = _bounded(np.stack([ends.w0, -ends.w1]))  # B runs backward
@@ -264,10 +253,9 @@ def _free_rates(w: Array, moments: Array, t: Array) -> tuple[Array, Array]:
 
 
 def _continuous_log(R: Array) -> Array:
-    """Return two logarithms of R that are continuous along the first axis.
+    """Return two logarithms of R that are continuous along the first axis, whose length is odd.
 
-    The length of this axis is odd. At the middle of the axis, one logarithm is the shortest, and
-    the other turns the other way round.
+    At the middle of this axis, they are the shortest one and the one that turns the other way.
     """
     shortest = log(R)
     angle = np.linalg.norm(shortest, axis=-1, keepdims=True)
@@ -289,8 +277,7 @@ def _beta(t: Array) -> Array:
 
 
 def _bounded(w: Array) -> Array:
-    """Return velocities clipped to ±1e6 to avoid overflow; faster problems are not solved."""
-    return np.clip(w, -1e6, 1e6)
+    return np.clip(w, -1e6, 1e6)  # to avoid overflow; faster problems are not solved
 
 
 def spun(curves: Curves, ends: Array, G: Array, worth: Mask) -> Curves:
@@ -315,24 +302,19 @@ def spun(curves: Curves, ends: Array, G: Array, worth: Mask) -> Curves:
 
 
 class Steps(NamedTuple):
-    """The limits of Gauss–Newton steps.
-
-    At most `most` steps are made. They end when one of them lowers the cost by less than the
-    fraction `worthwhile`.
-    """
+    """The limits of Gauss–Newton steps."""
 
     most: int
-    worthwhile: float
+    worthwhile: float  # they end when one of them lowers the cost by less than this share
 
 
 def lowered(functional: Functional, curves: Curves, steps: Steps) -> Curves:
     """Lower the costs of curves by Gauss–Newton steps.
 
-    For R exp(η̂), the rates change by δw = η' + w × η and its derivatives. So the deviation u
-    changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A step uses the η that minimises
-    the integral of the squared new deviation. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the ends, and
-    p has half as many coefficients as there are nodes. A quarter of η or three times η is used
-    instead if the curve then costs less.
+    For R exp(η̂), the deviation u changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A
+    step uses the η that minimises the integral of the squared new deviation, or this η times
+    another of the `SHARES` if the curve then costs less. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the
+    ends, and p has half as many coefficients as there are nodes.
     """
     of_curves = functional.take(curves.problem)
     R, cost = curves.R.copy(), cost_at_nodes(of_curves, curves.R)
@@ -349,7 +331,6 @@ def lowered(functional: Functional, curves: Curves, steps: Steps) -> Curves:
 
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
-    """Return the cheaper of R and the best curve after a step times `SHARES`, and its cost."""
     each = np.arange(len(R))
     shares = SHARES[:, None, None, None] * _best_change(functional, R)
     tried = R @ cayley(shares)
@@ -362,7 +343,6 @@ def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]
 
 
 def _best_change(functional: Functional, R: Array) -> Array:
-    """Return the η of a Gauss–Newton step at the nodes."""
     bumps = _bumps(R.shape[1], functional.ends // 2 + 1)
     J, u = gauss_newton(functional, R, bumps)
     x = np.linalg.solve(J.mT @ J, -(J.mT @ u))
@@ -388,7 +368,7 @@ def gauss_newton(functional: Functional, R: Array, shapes: list[Array]) -> tuple
 def by_eta(by: list[Array], rates: list[Array]) -> list[Array]:
     """Return D₀, D₁, … of `lowered`, from the derivatives of u with respect to w, w', ….
 
-    By Leibniz's rule δw⁽ⁱ⁾ = η⁽ⁱ⁺¹⁾ + Σ (i over j) w⁽ⁱ⁻ʲ⁾ × η⁽ʲ⁾.
+    They follow from δw = η' + w × η and its derivatives.
     """
     W = [hat(rate) for rate in rates]
     if len(by) == 2:
@@ -405,19 +385,6 @@ def cost_at_nodes(functional: Functional, R: Array) -> Array:
     """Return an approximation of ∫ ‖u‖² dt for curves given by R at the nodes."""
     u = functional.deviation(*rates_of(R, functional.ends // 2 + 1))
     return np.sum(u**2, axis=-1) @ grid(R.shape[1]).integral[-1]
-
-
-def rates_of(R: Array, count: int) -> list[Array]:
-    """Return `count` rates w, w', … at the nodes, from R at the nodes."""
-    return with_derivatives(vee(R.mT @ along(grid(R.shape[1]).derivative, R)), count - 1)
-
-
-def with_derivatives(values: Array, count: int) -> list[Array]:
-    """Return values at the nodes, shape (..., n, columns), and their first derivatives."""
-    found = [values]
-    for _ in range(count):
-        found.append(grid(values.shape[-2]).derivative @ found[-1])
-    return found
 
 
 @lru_cache

@@ -57,11 +57,9 @@ class Optimum(Curve):
 
     Notes
     -----
-    The proof of `certified` shows that the second variation is positive: it computes this quadratic
-    form on polynomials and bounds the rest (see `rbcourse.optimum._second_variation`). The proof
-    holds up to rounding, quadrature and the error of the computed curve. It does not exclude
-    distant curves that cost less. An eigenvalue below 1e-6 times the leading term counts as 0. For
-    the acceleration of a ball and times from 0 to 1, ‖c‖ < 2π³ is a sufficient condition
+    The proof of `certified` shows that the second variation is positive, up to rounding, quadrature
+    and the error of the computed curve. It does not exclude distant curves that cost less. For the
+    acceleration of a ball and times from 0 to 1, ‖c‖ < 2π³ is a sufficient condition
     (docs/near_optimal.md).
     """
 
@@ -115,11 +113,7 @@ class Optimum(Curve):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class OptimalRotation(Optimum):
-    """An `Optimum` on SO(3), along which R p is constant.
-
-    By BK (19), R w'' is constant for a ball, since (R w'')' = R (w''' + w × w'').
-    Source: beyond BK 2; BK (19).
-    """
+    """An `Optimum` on SO(3), along which R p is constant."""
 
     functional: Functional
     series: Array  # Chebyshev coefficients of R, w, w', …, with a column for each entry
@@ -128,12 +122,10 @@ class OptimalRotation(Optimum):
 
     @property
     def found(self) -> OptimalRotation:
-        """The curve itself."""
         return self
 
     @property
     def cost(self) -> Any:
-        """The cost that the optimum minimises."""
         return self._told(self.report["cost"] / self.duration ** (self.functional.ends + 1))
 
     @property
@@ -147,7 +139,6 @@ class OptimalRotation(Optimum):
         return is_positive(self.flat).reshape(self.batch_shape)
 
     def take(self, index: Any) -> Self:
-        """Return the curves that have these indices in the flattened stack."""
         functional = self.functional.take(np.reshape(index, -1))
         return replace(super().take(index), functional=functional)
 
@@ -180,12 +171,10 @@ class OptimalMotion(RigidMotion, Optimum):
 
     @property
     def found(self) -> OptimalRotation:
-        """The optimal rotation."""
         return self.rotation
 
     @property
     def cost(self) -> Any:
-        """The cost that the optimum minimises: rotation and translation."""
         return self._told(self.rotation.cost + self.body.mass * self.moving_cost)
 
     @property
@@ -193,9 +182,8 @@ class OptimalMotion(RigidMotion, Optimum):
         """The integral of ‖d_c''‖² of the centre of mass, for a cubic path, shape (...)."""
         x0, x1, v0, v1 = np.moveaxis(self.path, -2, 0)
         start, end = v0 - (x1 - x0), v1 - (x1 - x0)
-        squares = np.sum(start**2 + start * end + end**2, axis=-1)
-        moving: Array = 4 * squares / self.duration**3
-        return moving
+        squares: Array = np.sum(start**2 + start * end + end**2, axis=-1)
+        return 4 * squares / self.duration**3
 
 
 def optimum_of(

@@ -19,7 +19,7 @@ method (`_collocation`) finds one of them near its start. So the search
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,11 +27,11 @@ from rbcourse._chebyshev import grid
 from rbcourse._numerics import EPS, Array
 from rbcourse.curves.bezier import corrected_bezier
 from rbcourse.curves.ends import Ends
-from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
+from rbcourse.curves.functionals import Effort, Jerk
 from rbcourse.optimum._collocation import (
     BallStationary,
-    Equations,
     Failure,
+    Results,
     Solution,
     Stationary,
     cayley,
@@ -55,8 +55,6 @@ from rbcourse.optimum._guesses import (
 from rbcourse.projection import nearest
 from rbcourse.so3 import log
 
-Result: TypeAlias = Solution | Failure
-Results: TypeAlias = list[Result]
 NOTHING = Failure(np.inf, 0)
 
 
@@ -95,19 +93,17 @@ LIMITS = Limits()
 class Task(NamedTuple):
     """A stack of problems with one batch axis, and the functions that solve them."""
 
-    batch: tuple[int, ...]  # the shape of the stack
-    functional: Functional
-    equations: Equations
+    equations: Stationary
     starts: Callable[[Numbers, int], Curves]  # curves of these problems (numbered 0, 1, …), n nodes
     solver: Callable[[Any, Array], Results]  # Newton's method
     nodes: Any  # the number of nodes of starting curves, for all problems or for each one
-    known: dict[int, Result]  # results that are already known; failures are ignored
+    known: dict[int, Solution | Failure]  # known results; failures are ignored
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def cheapest(task: Task) -> Results:
     """Return the cheapest solution that is found for each problem."""
-    of_bodies = isinstance(task.functional, Effort)
+    of_bodies = isinstance(task.equations.functional, Effort)
     search = BodySearch(task) if of_bodies else Search(task)
     return search.run()
 
@@ -120,8 +116,9 @@ class Search:
 
     def __init__(self, task: Task) -> None:
         self.task = task
-        self.functional: Any = task.functional
-        self.ends = task.equations.ends
+        equations = task.equations
+        self.functional: Any = equations.functional
+        self.ends = equations.ends
         self.count = len(self.ends)
         self.found: Results = [NOTHING] * self.count
         for i, one in task.known.items():
@@ -139,8 +136,8 @@ class Search:
 
     def first_nodes(self) -> Numbers:
         """Return the number of nodes on which the search begins, for each problem."""
-        sizes = np.linalg.norm(self.ends, axis=-1)
         weights = np.array([1, 1, 1 / 6, 1 / 6])  # of w and w' in a quintic
+        sizes = np.linalg.norm(self.ends, axis=-1)
         speed = sizes @ weights[: sizes.shape[1]]
         nodes = self.task.nodes
         for fast, more in zip(LIMITS.fast, LIMITS.more_nodes, strict=True):
@@ -148,7 +145,10 @@ class Search:
         return np.asarray(nodes)
 
     def search(self, problems: Numbers, n: int) -> None:
-        """Search with n nodes; then with more nodes, and with more steps, where this fails."""
+        """Search with n nodes; then with more nodes, and with more steps, where this fails.
+
+        Solutions that still cost more than a curve are marked.
+        """
         curves = Curves.none(n)
         for nodes in n, *(more for more in LIMITS.more_nodes if more > n):
             curves = self.cheap_curves(problems, nodes, curves)
@@ -157,10 +157,6 @@ class Search:
             problems = self.too_costly(problems, curves)
             if not len(problems):
                 return
-        self.search_longer(problems, curves)
-
-    def search_longer(self, problems: Numbers, curves: Curves) -> None:
-        """Follow all curves after more Gauss–Newton steps; mark solutions that still cost more."""
         some = np.isin(curves.problem, problems)
         lower = lowered(self.functional, curves.take(some), LIMITS.last)
         self.follow(lower)
@@ -203,12 +199,11 @@ class Search:
         return problems[failed[problems]]
 
     def costs(self) -> Array:
-        """Return the costs of the solutions; the cost of a missing solution is inf."""
         return np.array([one.cost for one in self.found])
 
 
 def _repeated(curves: Curves) -> Mask:
-    """Tell which curves are close, at all nodes, to a cheaper curve of the same problem."""
+    """Tell which curves have nearly the entries of a cheaper curve of the same problem."""
     order = np.lexsort((curves.cost, curves.problem))
     problem, R = curves.problem[order], curves.R[order]
     repeated = np.zeros(len(order), bool)
@@ -228,7 +223,6 @@ class BodySearch(Search):
     followed = LIMITS.followed_of_bodies
 
     def run(self) -> Results:
-        """Search for the solutions that are not known, and try to leave their axes."""
         super().run()
         self.leave_the_axis()
         return self.found
@@ -313,11 +307,10 @@ class BodySearch(Search):
 
 
 def _across(w: Array, G: Array) -> Array:
-    """Return four directions perpendicular to the approximate axis of w, shape (4, 3).
+    """Return four directions in which w deviates from its approximate axis, shape (4, 3).
 
-    They are the directions in which w deviates from its axis. If w does not deviate, the inertia
-    determines the directions. If the moments are equal, the order of the axes determines the
-    directions.
+    If w does not deviate, the inertia determines the directions. If the moments are equal, the
+    order of the axes determines them.
     """
     order = np.diag([3, 2, 1])
     weak = 1e-6 * (G + 1e-3 * order)
@@ -332,8 +325,6 @@ def ball(given: Ends) -> Task:
     ends, rates = _flat(given)
     equations = BallStationary(ends.R0, ends.R1, rates)
     return Task(
-        batch=given.w0.shape[:-1],
-        functional=BallAcceleration(),
         equations=equations,
         starts=lambda problems, n: starts(ends.take(problems), n),
         solver=relax_ball,
@@ -342,7 +333,7 @@ def ball(given: Ends) -> Task:
     )
 
 
-def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Result]:
+def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution | Failure]:
     """Solve problems with small σ, w0 and w1 from one start; return solutions by problem index.
 
     If the entries of σ, w0 and w1 are below ½, their norms are below 1. With e = σ − (w0 + w1)/2
@@ -368,6 +359,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     multiple of I, the optimum of the ball is the solution.
     """
     ends, rates = _flat(given)
+    G = np.broadcast_to(G, (*given.w0.shape, 3))
     functional = Effort(G.reshape(-1, 3, 3), of_torque=of_torque)
     of_balls = cheapest(ball(given))
     deviation = np.abs(functional.G - np.eye(3))
@@ -383,8 +375,6 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
         return curves.joined(free, known)
 
     return Task(
-        batch=given.w0.shape[:-1],
-        functional=functional,
         equations=Stationary(functional, ends.R0, ends.R1, rates),
         starts=start,
         solver=relax,
@@ -394,7 +384,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
 
 
 def _on_nodes(results: Results, n: int) -> Curves:
-    """Return the solutions as curves on n nodes; their problems are their places in the list."""
+    """Return the solutions as curves on n nodes, numbered by their places in the list."""
     curves = []
     for i, one in enumerate(results):
         if isinstance(one, Solution):
@@ -412,8 +402,6 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
         return starts(ends.take(problems), n, *accelerations)
 
     return Task(
-        batch=given.w0.shape[:-1],
-        functional=Jerk(),
         equations=Stationary(Jerk(), ends.R0, ends.R1, rates),
         starts=start,
         solver=relax,
@@ -423,11 +411,9 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
 
 
 def _flat(given: Ends, *accelerations: Array) -> tuple[Ends, Array]:
-    """Return the ends with one batch axis and exact rotations, and the end values (N, m, 3).
-
-    Newton's method fails if the rotations have few correct digits.
-    """
+    """Return the ends with one batch axis and exact rotations, and the end values (N, m, 3)."""
     ends = given.flat()
+    # Newton's method fails if the rotations have few correct digits
     R0, _ = nearest(ends.R0)
     R1, _ = nearest(ends.R1)
     ends = ends._replace(R0=R0, R1=R1)

@@ -5,12 +5,11 @@ poses. Then the cost changes by a sum over the legs,
 
     δJ = Σ (μ · δx at the end − μ · δx at the start),    x = w (for the jerk, also w'),
 
-where μ are the momenta (`rbcourse.curves.functionals`); for a ball, μ = 4 w'. So at an optimum the
-momenta are the same on both sides of each inner pose, and 0 at natural ends. A Newton step
-linearises each leg. The changes of its momenta, for unit changes of x at its ends, are a symmetric
-matrix. Together these matrices are the second derivative of the cost, and the linear system for the
-values x at the poses (`curves.velocities.KnotSystem`). If it is positive definite, and each leg is
-a strict local minimum among the curves with its ends (`_second_variation`), so is the spline.
+where μ are the momenta (`rbcourse.curves.functionals`). So at an optimum the momenta are the same
+on both sides of each inner pose, and 0 at natural ends. A Newton step linearises each leg. The
+changes of its momenta, for unit changes of x at its ends, are a symmetric matrix. Together these
+matrices are the second derivative of the cost, and the linear system for the values x. If it is
+positive definite, and each leg is a strict local minimum (`_second_variation`), so is the spline.
 """
 
 from __future__ import annotations
@@ -34,7 +33,6 @@ from rbcourse.optimum._collocation import (
     UNRESOLVED,
     BallStationary,
     Change,
-    Equations,
     Errors,
     Failure,
     Solution,
@@ -46,9 +44,11 @@ from rbcourse.optimum._collocation import (
     on_nodes,
     orthogonal,
     rates_at_nodes,
+    rates_of,
     take,
+    with_derivatives,
 )
-from rbcourse.optimum._guesses import SAME, cost_at_nodes, gauss_newton, rates_of, with_derivatives
+from rbcourse.optimum._guesses import SAME, cost_at_nodes, gauss_newton
 from rbcourse.so3 import exp_so3, log
 
 STEPS = 20  # of Newton's method; then it has failed
@@ -69,13 +69,10 @@ LOWERED, BUMPS = 33, 8  # nodes of curves whose costs are lowered, and polynomia
 
 
 class Problem(NamedTuple):
-    """The data of a spline: rotations, durations with mean 1, end conditions, and functional.
-
-    A curve is given by its rotations at Chebyshev nodes of the legs, shape (N − 1, n, 3, 3).
-    """
+    """The data of a spline. A curve is given at the nodes of its legs, shape (N − 1, n, 3, 3)."""
 
     R: Array
-    h: Array
+    h: Array  # the durations, with mean 1
     ends: Conditions
     functional: Functional
 
@@ -93,25 +90,22 @@ class Problem(NamedTuple):
         return np.asarray(self.functional.scale * self.h**-power)
 
     def cost(self, R: Array) -> float:
-        """Return the cost of a curve."""
         return self.total(cost_at_nodes(self.functional, R))
 
     def total(self, costs: ArrayLike) -> float:
-        """Return the cost from ∫ ‖u‖² dt of each leg, for times from 0 to 1."""
+        """Return the cost from ∫ ‖u‖² dt of each leg."""
         return float(np.sum(np.asarray(costs) * self.weight))
 
     def values(self, R: Array) -> Array:
         """Return w (and w') of a curve at the poses, as given at its ends."""
         rates = np.concatenate(rates_of(R, self.functional.ends // 2), axis=-1)
         rates /= self.scale[:, None, : rates.shape[-1]]
-        starts = rates[:, 0]
-        values = np.append(starts, rates[-1:, -1], axis=0)
+        values = np.append(rates[:, 0], rates[-1:, -1], axis=0)
         if self.ends.periodic:
             values[[0, -1]] = (values[0] + values[-1]) / 2
-        fixed = self.ends.fixed[:, None]
-        return np.where(fixed, self.ends.given, values)
+        return np.where(self.ends.fixed[:, None], self.ends.given, values)
 
-    def equations(self, values: Array, n: int) -> Equations:
+    def equations(self, values: Array, n: int) -> Stationary:
         """Return the equations R p = c of the legs, for n nodes and values at the poses."""
         ends = self.R[:-1], self.R[1:], self.own(values)
         if not isinstance(self.functional, BallAcceleration):
@@ -140,8 +134,8 @@ class Found(NamedTuple):
 def solve_spline(problem: Problem, R: Array) -> Found | Failure:
     """Return a minimum that Newton's method finds.
 
-    If a curve turns about one axis only, no step leaves this axis. For a body, curves that leave
-    the axis can cost less, so a second search starts from a curve off the axis.
+    No step leaves the axis of a curve that turns about one axis only. For a body, a curve that
+    leaves the axis can cost less, so a second search starts off the axis.
     """
     found = _searched(problem, R, (None, *DESCENTS))
     if not isinstance(problem.functional, Effort):
@@ -153,7 +147,6 @@ def solve_spline(problem: Problem, R: Array) -> Found | Failure:
 
 
 def _about_one_axis(R: Array) -> bool:
-    """Tell whether a curve turns about one axis only."""
     turns = log(R[0, 0].T @ R)
     rank = np.linalg.matrix_rank(turns.reshape(-1, 3), rtol=ON_AXIS)
     return bool(rank < 2)
@@ -171,8 +164,8 @@ def _off_the_axis(R: Array) -> Array:
 def _searched(problem: Problem, R: Array, descents: Sequence[float | None]) -> Found | Failure:
     """Return a minimum that Newton's method finds from a curve (None) or from cheaper curves.
 
-    The minimum must not cost more than its start. For the jerk, this is not required, and the cost
-    is not lowered, since the start does not have all given end values.
+    It must not cost more than its start; but for the jerk, the start does not have all given end
+    values, so its cost is no bound, and is not lowered.
     """
     of_jerk = problem.functional.ends == 4
     bound = np.inf if of_jerk else problem.cost(R)
@@ -191,16 +184,12 @@ def _searched(problem: Problem, R: Array, descents: Sequence[float | None]) -> F
 
 
 class Legs(NamedTuple):
-    """The state of Newton's method: the values at the poses, and the equations of the legs.
+    """The state of Newton's method on one set of nodes."""
 
-    `tail` is the largest of the last Chebyshev coefficients, and `left` the largest error.
-    """
-
-    values: Array
-    equations: Equations
+    equations: Stationary
     unknowns: Unknowns
     errors: Errors
-    tail: float
+    tail: float  # the largest of the last Chebyshev coefficients
 
     @property
     def left(self) -> float:
@@ -208,13 +197,11 @@ class Legs(NamedTuple):
         return float(self.errors.largest.max())
 
     def stepped(self, step: Change, share: float) -> Unknowns:
-        """Return the unknowns after a share of a step, with orthogonal matrices R."""
         shares = np.full(len(step.c), share)
         R, k, c = self.equations.stepped(self.unknowns, step, shares)
         return self.equations.unknowns(orthogonal(R), k, c)
 
     def solutions(self, steps: int) -> list[Solution]:
-        """Return the solution of each leg; `steps` is the number of steps."""
         costs = self.equations.costs(self.unknowns.k).tolist()
         left = self.errors.largest.tolist()
         each = zip(*self.unknowns, costs, left, strict=True)
@@ -227,7 +214,6 @@ class Legs(NamedTuple):
 
 @np.errstate(over="raise", invalid="raise", divide="raise")
 def _newton(problem: Problem, R: Array) -> Found | Failure:
-    """Return the result of Newton's method from a curve."""
     values = problem.values(R)
     turned = np.inf  # rad: the largest turn of a node by the last step
     unknowns = problem.equations(values, R.shape[1]).first(R)
@@ -261,7 +247,7 @@ def _on_enough_nodes(problem: Problem, values: Array, unknowns: Unknowns, turned
             unknowns = equations.refined(unknowns, more)
         errors = equations.errors(unknowns)
         tail = float(equations.tails(unknowns).max())
-        legs = Legs(values, equations, unknowns, errors, tail)
+        legs = Legs(equations, unknowns, errors, tail)
         if legs.resolved(turned):
             break
     return legs
@@ -322,15 +308,8 @@ def _momenta(functional: Functional, legs: Legs, responses: Change) -> tuple[Arr
 def _knot_system(H: Array, b: Array) -> KnotSystem:
     """Return the system of matrices and loads of the legs; the values at the start come first."""
     m = b.shape[1] // 2
-    start = slice(m)
-    end = slice(m, None)
-    return KnotSystem(
-        A=H[:, start, start],
-        B=H[:, start, end],
-        D=H[:, end, end],
-        b0=b[:, start],
-        b1=b[:, end],
-    )
+    A, B, D = H[:, :m, :m], H[:, :m, m:], H[:, m:, m:]
+    return KnotSystem(A, B, D, b0=b[:, :m], b1=b[:, m:])
 
 
 def _minimum(

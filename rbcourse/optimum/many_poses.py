@@ -1,7 +1,4 @@
-"""Curves of least acceleration, torque or jerk through many rotations or poses.
-
-`rbcourse.optimum._spline` has the method.
-"""
+"""Curves of least acceleration, torque or jerk through many rotations or poses."""
 
 from __future__ import annotations
 
@@ -74,11 +71,11 @@ def minimum_acceleration_spline(
     Notes
     -----
     If velocities are given at both ends, a curve of least acceleration exists. With natural or
-    periodic ends, it may not exist. For example, for rotations by 0, 1 and 0.3 rad about one axis,
-    at the times 0, 1 and 1 + √2, more full turns on the legs make the cost as small as you like.
-    For bodies, a result that is not ``certified`` can have a leg that is a saddle.
-    A leg that is much shorter than its neighbours may spin; to prevent this, insert poses. Singular
-    set: neighbouring rotations a half-turn apart raise ValueError.
+    periodic ends, it may not exist: for rotations by 0, 1 and 0.3 rad about one axis, at the times
+    0, 1 and 1 + √2, more full turns on the legs make the cost as small as you like. For bodies, a
+    result that is not ``certified`` can have a leg that is a saddle. A leg that is much shorter
+    than its neighbours may spin; to prevent this, insert poses. Singular set: neighbouring
+    rotations a half-turn apart raise ValueError.
 
     Examples
     --------

@@ -1,8 +1,4 @@
-"""Curves between two rotations or poses with the least acceleration (BK (19)), torque or jerk.
-
-`rbcourse.textbook.minimum_acceleration` has (19) as it is printed. `_collocation` solves it fast,
-as R w'' = c, and `_search` chooses the curves from which it starts.
-"""
+"""Curves between two rotations or poses with the least acceleration (BK (19)), torque or jerk."""
 
 from __future__ import annotations
 
@@ -83,21 +79,15 @@ def minimum_acceleration(
     sufficient one, and has several solutions. Costs with a relative difference below 1e-9 count as
     equal, so that rounding does not decide which curve is returned.
 
-    The starting curves turn the short way or the long way. If ‖w0‖ + ‖w1‖ > 4π, some follow the
-    motion that costs least if the rotation at t = 1 is free. For a body, the search also starts
-    from the optimum of the ball and from curves that lead from one free motion to another, and it
-    adds spin about the principal axes. Gauss–Newton steps lower the costs of all these curves. Then
-    Newton's method solves R p = c, starting from the cheapest curves. The result is stationary, and
-    ``certified`` tells whether it is proven to be a local minimum. It is not proven that no other
-    curve costs less, even if ``converged`` is True. For one of 300 balls with speeds of 15 to 30 at
-    both ends, sixteen random starts of another optimiser found a cheaper curve (by 1.2 %). See
-    docs/near_optimal.md for bodies. For very thin rods, the method may not converge. If the end
-    velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)), where p is a cubic and σ is a
-    logarithm of R0ᵀR1 (not always the shortest logarithm).
-
-    For poses, the rotation and the position d + R r of the centre of mass are independent in the
-    metric of the kinetic energy, so that each has its own optimum. The mass changes the cost of the
-    motion, but not the motion. `projected_cubic` is near-optimal and has a closed form.
+    Newton's method solves R p = c, starting from the cheapest of several curves, which turn the
+    short way or the long way. The result is stationary, and ``certified`` tells whether it is
+    proven to be a local minimum. It is not proven that no other curve costs less, even if
+    ``converged`` is True. For one of 300 balls with speeds of 15 to 30 at both ends, sixteen random
+    starts of another optimiser found a cheaper curve (by 1.2 %). See docs/near_optimal.md for
+    bodies. For very thin rods, the method may not converge. If the end velocities are along the
+    geodesic, the optimum is R0 exp(σ̂ p(t)), where p is a cubic and σ is a logarithm of R0ᵀR1 (not
+    always the shortest logarithm). For poses, the mass changes the cost of the motion, but not the
+    motion. `projected_cubic` is near-optimal and has a closed form.
 
     Examples
     --------
@@ -116,7 +106,7 @@ def minimum_acceleration(
     given = between(start, goal, v0, v1, body=body, duration=duration)
     if given.body.is_ball:
         return _solved(ball(given.ends), given)
-    return _solved(of_body(given.ends, _inertias(given), of_torque=False), given)
+    return _solved(of_body(given.ends, given.body.inertia, of_torque=False), given)
 
 
 @described_by(minimum_acceleration)
@@ -147,8 +137,8 @@ def minimum_torque(
     Returns
     -------
     Optimum
-        A `Curve` that meets all four boundary conditions. Its ``cost``, ∫ ‖τ‖² dt with the torque τ
-        = G w' + w × G w, is the lowest that was found; ``c`` is the constant R p of the costate p.
+        A `Curve` that meets all boundary conditions. Its ``cost``, the `torque_cost`, is the lowest
+        that was found; ``c`` is the constant R p of the costate p.
 
     Notes
     -----
@@ -156,10 +146,9 @@ def minimum_torque(
     a rod may not be the cheapest one, even if ``converged`` is True: for 3 of 600 rods with moments
     (1, 6 to 10, up to 1 more), angles up to π and speeds up to 9, another optimiser found a curve
     that is cheaper, by 0.5, 3.5 and 6.3 %. For thin rods, the method often does not converge. A
-    turn about a principal axis is a stationary curve. A turn about the axis of the largest moment
-    of inertia may be a saddle. Then a curve that leaves the axis costs less; the search also tries
-    such curves. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c; see
-    `rbcourse.textbook.minimum_torque`.
+    turn about a principal axis is a stationary curve; about the axis of the largest moment of
+    inertia, it may be a saddle. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c
+    (`rbcourse.textbook.minimum_torque`).
 
     Examples
     --------
@@ -176,7 +165,7 @@ def minimum_torque(
     """
     given = between(start, goal, v0, v1, body=as_body(body), duration=duration)
     given = on_rotations(given, "minimum torque")
-    return _solved(of_body(given.ends, _inertias(given), of_torque=True), given)
+    return _solved(of_body(given.ends, given.body.inertia, of_torque=True), given)
 
 
 @described_by(minimum_acceleration)
@@ -207,16 +196,14 @@ def minimum_jerk(
     Returns
     -------
     Optimum
-        A `Curve` that meets all six boundary conditions. Its ``cost``, the integral of the squared
-        covariant jerk ∫ 2 ‖w'' + ½ w × w'‖² dt, is the lowest that was found; ``c`` is the constant
-        R p of the costate p.
+        A `Curve` that meets all boundary conditions. Its ``cost``, the `jerk_cost`, is the lowest
+        that was found; ``c`` is the constant R p of the costate p.
 
     Notes
     -----
-    The method, errors, warnings and singular set are those of `minimum_acceleration`. If all end
-    velocities and accelerations are 0, the optimum is R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)). It follows
-    the geodesic, and costs 1440 ‖σ‖². `closed_forms.exponential_quintic` is near-optimal and has a
-    closed form.
+    The method, errors, warnings and singular set are those of `minimum_acceleration`. From rest to
+    rest, the optimum follows the geodesic: R0 exp(σ̂ (10 t³ − 15 t⁴ + 6 t⁵)), which costs
+    1440 ‖σ‖². `closed_forms.exponential_quintic` is near-optimal and has a closed form.
 
     Examples
     --------
@@ -244,9 +231,8 @@ def stationary(guess: Curve) -> Optimum:
     Returns
     -------
     Optimum
-        A `Curve` along which R w'' is constant. At both ends it has the rotation and the velocity
-        of the guess. It may not be the cheapest such curve. If no curve is found, the result is NaN
-        (see ``converged``).
+        A `Curve` along which R w'' is constant. It may not be the cheapest such curve. If no curve
+        is found, the result is NaN (see ``converged``).
 
     Examples
     --------
@@ -266,8 +252,8 @@ def stationary(guess: Curve) -> Optimum:
     R = np.moveaxis(unit(grid(LIMITS.nodes).t).reshape(LIMITS.nodes, -1, 3, 3), 0, 1)
     with np.errstate(over="ignore", invalid="ignore"):
         found = task.solver(task.equations, R)
-        ends = task.equations.ends
-        return optimum_of(task.functional, ends, found, guess.duration, Body.ball())
+        functional, ends = task.equations.functional, task.equations.ends
+        return optimum_of(functional, ends, found, guess.duration, Body.ball())
 
 
 class ConvergenceError(RuntimeError):
@@ -284,33 +270,24 @@ class ConvergenceError(RuntimeError):
         self.iterations = iterations
 
     def __reduce__(self) -> tuple[type, tuple[float, int]]:
-        """Return the class and its arguments, so that pickle restores both attributes."""
-        return type(self), (self.residual, self.iterations)
-
-
-def _inertias(given: Given) -> Array:
-    return np.broadcast_to(given.body.inertia, (*given.duration.shape, 3, 3))
+        return type(self), (self.residual, self.iterations)  # so that pickle restores both
 
 
 def _solved(task: Task, given: Given) -> Optimum:
-    """Return the cheapest curve that is found for each problem."""
     solutions = cheapest(task)
-    if not task.batch and isinstance(solutions[0], Failure):
+    if not given.duration.ndim and isinstance(solutions[0], Failure):
         raise ConvergenceError(*solutions[0])
-    ends, T = task.equations.ends, given.duration
-    rotation = optimum_of(task.functional, ends, solutions, T, given.body)
-    _warn_if_not_converged(rotation)
+    equations, T = task.equations, given.duration
+    rotation = optimum_of(equations.functional, equations.ends, solutions, T, given.body)
+    lost = np.isnan(rotation.cost)
+    _warn(rotation, lost, "did not converge", "their curves are NaN")
+    beaten = ~np.asarray(rotation.converged) & ~lost
+    why = "a curve that was tried costs less"
+    _warn(rotation, beaten, "may not have reached their optimum", why)
     if not given.path:
         return rotation
     path = np.stack(given.path, axis=-2)
     return OptimalMotion(duration=T, body=given.body, rotation=rotation, path=path)
-
-
-def _warn_if_not_converged(curve: OptimalRotation) -> None:
-    lost = np.isnan(curve.cost)
-    _warn(curve, lost, "did not converge", "their curves are NaN")
-    beaten = ~np.asarray(curve.converged) & ~lost
-    _warn(curve, beaten, "may not have reached their optimum", "a curve that was tried costs less")
 
 
 def _warn(curve: OptimalRotation, some: Array, what: str, why: str) -> None:
@@ -321,5 +298,5 @@ def _warn(curve: OptimalRotation, some: Array, what: str, why: str) -> None:
             f"{len(places)} of {curve.count} problems {what}, the first of them {first}: {why} "
             "(see converged)",
             RuntimeWarning,
-            stacklevel=5,
+            stacklevel=4,
         )
