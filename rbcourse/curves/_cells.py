@@ -64,7 +64,13 @@ BLOCK = 1024  # cells, or times, evaluated together, which bounds the memory
 MEMORY = 200  # bytes for each cell: places, two passes, and the result
 PLACES = np.array([0, 0.5, 1])  # the places in a cell at which the path is evaluated
 CHECKED = np.array([0.04, 0.25, 0.75, 0.96])  # the places at which the limits are checked
-CONTROL = np.array([[1, 0, 0], [-0.5, 2, -0.5], [0, 0, 1]])
+CONTROL = np.array(
+    [
+        [1, 0, 0],
+        [-0.5, 2, -0.5],
+        [0, 0, 1],
+    ]
+)
 """Maps the values of a quadratic polynomial at the places to its Bernstein coefficients."""
 
 
@@ -95,12 +101,14 @@ class Limit:
         parts = (part / self.bound for part in self._quantity(V, A, R))
         a, b, k = (np.expand_dims(part, axis) for part in parts)
         if self.of_speed:
-            return a[..., :1], np.vecdot(b, b)[..., None], k[..., :1]
+            square = np.vecdot(b, b)
+            return a[..., :1], square[..., None], k[..., :1]
         return a, b, k
 
     def _quantity(self, V: Array, A: Array, R: Array) -> Triple:
         """Return a, b and k of the vector itself, such as the torque, each of shape (..., 3)."""
-        G, m, r = self.body.inertia, self.body.mass, self.body.centre
+        body = self.body
+        G, m, r = body.inertia, body.mass, body.centre
         w = V[..., :3]
         w_rate = A[..., :3]
         zero = np.zeros_like(w)
@@ -113,14 +121,17 @@ class Limit:
         v = V[..., 3:] + cross(w, r)
         if self.name == "speed":
             return zero, v, zero
-        v_rate = A[..., 3:] + cross(w_rate, r) + cross(w, cross(w, r))
+        turning = cross(w_rate, r)
+        v_rate = A[..., 3:] + turning + cross(w, cross(w, r))
         if self.name == "acceleration":
             return v, v_rate, zero
-        return m * v, m * v_rate, -m * matvec(R.mT, self.gravity)
+        weight = m * matvec(R.mT, self.gravity)
+        return m * v, m * v_rate, -weight
 
     def share(self, used: Array) -> Array:
         """Return the largest share that a motion with the vectors a u + b x + k uses."""
-        share = np.linalg.norm(used, axis=-1).max(axis=-1)
+        norms = np.linalg.norm(used, axis=-1)
+        share = norms.max(axis=-1)
         return np.sqrt(share) if self.of_speed else share
 
 
@@ -144,7 +155,8 @@ def as_limits(
     if not bounds:
         raise ValueError(f"limits: none of {', '.join(SPEEDS + BENDS)} is given")
     moved = as_body(body, curve.body)
-    if {"torque", "force"} & bounds.keys() and body is None and moved.is_ball:
+    by_inertia = {"torque", "force"} & bounds.keys()
+    if by_inertia and body is None and moved.is_ball:
         raise ValueError("body: it is required for a limit on the torque or the force")
     as_single("body.inertia", moved.inertia, 3, 3)
     g = as_single("gravity", gravity, 3)
@@ -201,7 +213,8 @@ class Path:
         legs = int(np.count_nonzero(self.moves))
         most = max(PATH // legs, min(MOST_IN_LEG, CHAIN // legs), USUAL_IN_LEG)
         least = max(PATH // legs, LEAST_IN_LEG)
-        halvings = np.log2(DENSE / np.clip(self.change, 1e-9, DENSE)).astype(np.intp)
+        change = np.clip(self.change, 1e-9, DENSE)
+        halvings = np.log2(DENSE / change).astype(np.intp)
         counts = np.maximum(most >> halvings, least)
         at_stop = ~np.isnan(self.x).all(axis=0)
         counts[at_stop] = max(most, LEAST_AT_STOP)
@@ -210,8 +223,8 @@ class Path:
     def stops(self, end: int, cells: Counts) -> dict[int, float]:
         """Return x at the stops at one end of the legs, by the cell at this end."""
         x = self.x[end]
-        chosen = self.moves & ~np.isnan(x)
-        return dict(zip(cells[chosen].tolist(), x[chosen].tolist(), strict=True))
+        chosen = np.flatnonzero(self.moves & ~np.isnan(x))
+        return {int(cells[i]): float(x[i]) for i in chosen}
 
 
 def _surveyed(curve: Curve, ends: Array) -> Path:
@@ -268,13 +281,14 @@ def _zero_at_ends(size: Array, share: float, rounding: Array) -> Flags:
 def _stops(V: Array, resting: Flags, moves: Flags) -> Flags:
     """Return whether the body stops between legs: at a corner, at rest, or next to a pause."""
     jump = np.abs(V[0, 1:] - V[-1, :-1]).max(axis=-1)
-    corner: Flags = (jump > CORNER * np.abs(V).max(axis=(0, 1, 3))).any(axis=-1)
+    largest = np.abs(V).max(axis=(0, 1, 3))
+    corner: Flags = (jump > CORNER * largest).any(axis=-1)
     rest = resting[1, :-1] & resting[0, 1:]
-    return corner | rest | ~moves[1:] | ~moves[:-1]
+    pause = ~moves[1:] | ~moves[:-1]
+    return corner | rest | pause
 
 
 def _change(V: Array) -> Array:
-    """Return the largest change of each leg's velocity, as a share of its size."""
     size = np.abs(V).max(axis=(0, 3))
     change = np.abs(V - V[2]).max(axis=(0, 3))
     return np.max(change / np.maximum(size, 1e-300), axis=-1)
@@ -308,6 +322,7 @@ class Cells:
         self.limits = limits
         total = int(counts.sum())
         _check_memory(total)
+        self.parts = list(blocks(total, BLOCK))
         first = np.cumsum(counts) - counts  # the first cell of each leg
         self.begins = path.stops(0, first)  # the first cells of pieces, and x there
         self.ends = path.stops(1, first + counts - 1)
@@ -339,7 +354,8 @@ class Cells:
             found = found.reshape(*shares.shape, *found.shape[1:])
             return found.swapaxes(0, 1)
 
-        return values(1), values(2), values(0)[..., :3, :3]
+        R = values(0)[..., :3, :3]
+        return values(1), values(2), R
 
     def _ellipses(self, start: int, stop: int) -> Array:
         """Return the coefficients of the limits A x² + 2 B x y + C y² + 2 D x + 2 E y + F ≤ 0.
@@ -358,33 +374,31 @@ class Cells:
 
     def _ellipses_of(self, limit: Limit, vectors: Triple, part: slice) -> Array:
         a, b, k = vectors
-        held = np.linalg.norm(k, axis=-1).max(axis=(0, 2))
+        norms = np.linalg.norm(k, axis=-1)
+        held = norms.max(axis=(0, 2))
         if held.max() >= 1:
             needed = f"{held.max():.6g} times the limit is needed to hold the body"
             where = self.near(part.start + np.argmax(held >= 1))
             raise ValueError(f"{limit.name}: {needed} {where}")
         if limit.of_speed:
-            b = np.where(self.near_rest[part, None, None], b.max(axis=0), b)
+            strict = self.near_rest[part, None, None]
+            b = np.where(strict, b.max(axis=0), b)
         u = a / (2 * self.h[part, None, None])
         place = PLACES[:, None, None, None]
         p = np.tensordot(CONTROL, (1 - place) * b - u, 1)
         q = np.tensordot(CONTROL, place * b + u, 1)
         k = np.tensordot(CONTROL, k, 1)
-        coefficients = [
-            np.vecdot(p, p),
-            np.vecdot(p, q),
-            np.vecdot(q, q),
-            np.vecdot(p, k),
-            np.vecdot(q, k),
-            np.vecdot(k, k) - 1,
-        ]
-        return np.stack(coefficients).swapaxes(2, 3).reshape(6, -1, len(held))
+        first = np.stack([p, p, q, p, q, k])
+        second = np.stack([p, q, q, k, k, k])
+        coefficients = np.vecdot(first, second)
+        coefficients[5] -= 1
+        return coefficients.swapaxes(2, 3).reshape(6, -1, len(held))
 
     def largest_shares(self, x: Array, y: Array) -> Array:
         """Return, for each cell, the largest share of a limit at the places `CHECKED`."""
         largest = np.zeros(len(x))
         place = CHECKED[:, None, None, None]
-        for part in reported("fastest, check", list(blocks(len(x), BLOCK))):
+        for part in reported("fastest, check", self.parts):
             V, A, R = self._sampled(part, CHECKED)
             start = x[part, None, None]
             step = y[part, None, None] - start
@@ -398,14 +412,15 @@ class Cells:
 
     def motion(self, x: Array, y: Array) -> Triple:
         last = np.array(list(self.ends))
-        s = np.insert(self.s, last + 1, self.path.knots[self.leg[last] + 1])
+        knots = self.path.knots
+        s = np.insert(self.s, last + 1, knots[self.leg[last] + 1])
         start = np.sqrt(x)
         end = np.sqrt(y)
         rate = np.insert(start, last + 1, end[last])
         steps = 2 * self.h / (start + end)
         steps = np.insert(steps, list(self.begins), 0)
         if not self.path.moves[-1]:  # a pause at the end
-            s = np.append(s, self.path.knots[-1])
+            s = np.append(s, knots[-1])
             rate = np.append(rate, 0)
             steps = np.append(steps, 0)
         return s, rate, np.cumsum(steps)
@@ -439,8 +454,7 @@ def _backward(cells: Cells) -> tuple[Array, Array]:
     ends = cells.ends
     low, high = np.empty((2, len(cells.s)))
     least, most = 0.0, 0.0
-    parts = list(blocks(len(cells.s), BLOCK))
-    for part in reported("fastest, first pass", parts[::-1]):
+    for part in reported("fastest, first pass", cells.parts[::-1]):
         Q = cells.ellipses(part.start, part.stop)
         # these are lists, because Python is faster than NumPy for single cells
         ellipses = Q.transpose(1, 2, 0).tolist()
@@ -469,10 +483,10 @@ def _forward(cells: Cells, low: Array, high: Array) -> tuple[Array, Array]:
     begins = cells.begins
     ends = cells.ends
     x, y = np.empty((2, len(low)))
-    for part in reported("fastest, second pass", list(blocks(len(low), BLOCK))):
+    for part in reported("fastest, second pass", cells.parts):
         A, B, C, D, E, F = cells.ellipses(part.start, part.stop)
-        swapped = np.stack([C, B, A, E, D, F], axis=-1).tolist()  # limits on y and x
-        for i, limits in enumerate(swapped, part.start):
+        swapped = np.stack([C, B, A, E, D, F], axis=-1)  # limits on y and x
+        for i, limits in enumerate(swapped.tolist(), part.start):
             if i in begins:
                 here = _first_x(begins[i], low[i], high[i])
             if i in ends:
@@ -480,7 +494,8 @@ def _forward(cells: Cells, low: Array, high: Array) -> tuple[Array, Array]:
             else:
                 least, most = low[i + 1], high[i + 1]
             x[i] = here
-            here = float(max(min(_largest(limits, here), most), least))
+            largest = _largest(limits, here)
+            here = float(max(min(largest, most), least))
             y[i] = here
     return x, y
 
@@ -491,7 +506,6 @@ def _span(x: float) -> tuple[float, float]:
 
 
 def _first_x(wanted: float, low: float, high: float) -> float:
-    """Return the largest x at the start of a piece, between `low` and `high`."""
     least, most = _span(wanted)
     x = float(min(high, most))
     if x < max(low, least) * (1 - ROUNDING):
@@ -548,5 +562,6 @@ def _can_rise(Q: Array, y: Array) -> Flags:
         x = most[active][:, None]
         # on the active limit, dx/dy = −(B x + C y + E)/(A x + B y + D)
         rises = (A - B) * x + (B - C) * y + D - E > 0
-    allowed = np.where(free, G <= 0, square >= 0) & (x >= np.maximum(least, 0))
+    allowed = np.where(free, G <= 0, square >= 0)
+    allowed &= x >= np.maximum(least, 0)
     return rises[active][:, None] & allowed.all(axis=1, keepdims=True)

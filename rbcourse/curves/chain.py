@@ -1,8 +1,4 @@
-"""Curves through many poses, composed of two-point curves.
-
-The velocities of the splines make the accelerations continuous (see `rbcourse.curves.velocities`).
-Optimal splines are in `rbcourse.optimum`.
-"""
+"""Curves through many poses, composed of two-point curves. Optimal ones: `rbcourse.optimum`."""
 
 from __future__ import annotations
 
@@ -68,11 +64,10 @@ def chain(
     accelerations : array_like, shape (N, 3) or (N, 6), optional
         Accelerations at the poses as ``c(t, 2)`` returns them, for quintic legs.
     leg : callable, optional
-        A function, from this package or your own, that makes the legs. It returns a stack of
-        two-point curves, and is called once for all legs, as ``leg(start, goal, v0, v1, a0, a1,
-        duration=...)``, without v0 and v1 (and a0 and a1) if no `velocities` (`accelerations`) are
-        given. The default is `projected_cubic`. Without velocities, legs such as those of
-        `geodesic` meet at corners, and legs such as those of `projected_cubic` rest at all poses.
+        A function, by default `projected_cubic`, that returns a stack of two-point curves. It is
+        called once for all legs, as ``leg(start, goal, v0, v1, a0, a1, duration=...)``, without v0
+        and v1 (and a0 and a1) if no `velocities` (`accelerations`) are given. Without velocities,
+        legs of `geodesic` meet at corners, and legs of `projected_cubic` rest at all poses.
 
     Returns
     -------
@@ -90,10 +85,8 @@ def chain(
     Notes
     -----
     A chain of cubic legs is C¹: the acceleration jumps, unless the velocities belong to a spline of
-    these legs. A chain of quintic legs is C². At the joints of projected legs, velocities agree to
-    a few eps of the largest ‖w‖, and accelerations to a few eps of ‖w‖² + ‖w'‖.
-    Singular set: that of the legs. Half-turns between successive poses raise ValueError. For a
-    larger turn, insert a pose.
+    these legs. A chain of quintic legs is C². Singular set: that of the legs. Half-turns between
+    successive poses raise ValueError. For a larger turn, insert a pose.
 
     Examples
     --------
@@ -112,7 +105,11 @@ def chain(
     if accelerations is not None:
         if velocities is None:
             raise ValueError("accelerations: not without velocities")
-        rates.append(_as_accelerations(accelerations, velocities.shape))
+        shape = velocities.shape
+        array = as_single("accelerations", accelerations, "N", shape[1])
+        if array.shape != shape:
+            raise ValueError(f"accelerations: shape {shape} is wanted, got {array.shape}")
+        rates.append(array)
     return _chain(leg or projected_cubic, times, poses, *rates)
 
 
@@ -142,15 +139,11 @@ def projected_spline(
 
     Notes
     -----
-    The acceleration is continuous, except at poses of `rest_at`. For two rotations and given
-    velocities, the result is the projected cubic. If the poses are moved, the spline moves with
-    them; if the times are reversed, the spline is reversed. For rotations with natural ends, its
-    relative excess over the optimum (`minimum_acceleration_spline`) is about 0.05 θ⁴, where θ is
-    the angle of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
-    `quaternion_spline` is 16 times smaller. For three rotations by 0, θ, 0 about one axis, at
-    equally spaced times and with natural ends, the excess is 20711/180180 θ⁴. A spline at rest at
-    both ends costs more than one with natural ends.
-    Singular set: that of the legs.
+    The acceleration is continuous, except at poses of `rest_at`. If the poses are moved, the spline
+    moves with them; if the times are reversed, the spline is reversed. For rotations with natural
+    ends, its relative excess over the optimum (`minimum_acceleration_spline`) is about 0.05 θ⁴,
+    where θ is the angle of a leg in rad: 0.3 % at 30°, 5 % at 60°, 30 % at 90°. The excess of
+    `quaternion_spline` is 16 times smaller. Singular set: that of the legs.
 
     Examples
     --------
@@ -173,8 +166,7 @@ def quaternion_spline(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natu
     Among the closed forms of this package, this spline is the nearest to the optimum
     (`minimum_acceleration_spline`). Its relative excess for rotations is about 0.003 θ⁴, where θ is
     the angle of a leg in rad. A leg of duration h turns the short way if h ‖ω‖ is below 8 at both
-    ends. If the poses are moved, the spline moves with them; if the times are reversed, the spline
-    is reversed. Singular set: that of the legs.
+    ends. Moved poses, reversed times and singular set: as for `projected_spline`.
     Source: beyond BK 13, beyond BK 14.
 
     Parameters
@@ -185,9 +177,8 @@ def quaternion_spline(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natu
     Returns
     -------
     Chain
-        A chain of `closed_forms.quaternion_cubic`. Its velocities, which make the acceleration
-        continuous, solve a linear system that is positive definite for all rotations. For poses,
-        the origin moves on a cubic spline.
+        A chain of `closed_forms.quaternion_cubic`, whose velocities make the acceleration
+        continuous. For poses, the origin moves on a cubic spline.
 
     Examples
     --------
@@ -227,8 +218,7 @@ def joined(rotation: Curve, position: Position) -> Curve:
     Raises
     ------
     ValueError
-        If an argument is not of this kind, or, at a call, if `position` returns another shape or a
-        number that is not finite.
+        Also at a call, if `position` returns another shape or a number that is not finite.
 
     Examples
     --------
@@ -382,7 +372,6 @@ class Chain(Curve):
             raise self._lost(error) from error
 
     def _once(self, t: float, orders: tuple[int, ...]) -> list[Array]:
-        """Return derivatives at one time."""
         times = self._times
         i = bisect_right(times, t, 1, len(times) - 1) - 1
         h = times[i + 1] - times[i]
@@ -444,8 +433,8 @@ def evaluate_legs(legs: Curve, own: NDArray[np.intp], shares: Array, order: int)
 def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Divide successive groups of `counts` rows into parts of equal length.
 
-    Return the group of each part, shape (parts,), and the rows, shape (parts, length). Shorter
-    parts are filled up by repeating their last row.
+    Return the group of each part, and its rows, shape (parts, length). Shorter parts are filled up
+    by repeating their last row.
     """
     mean = math.ceil(counts.sum() / max(1, np.count_nonzero(counts)))
     length, ends = max(1, min(int(counts.max(initial=0)), 2 * mean)), np.cumsum(counts)
@@ -469,7 +458,7 @@ def _at_ends(legs: Curve, order: Order) -> Array:
 
 
 def _chain(leg: Leg, times: Array, poses: Array, *rates: Array) -> Chain:
-    """Return the chain of legs between checked poses, with velocities (and accelerations)."""
+    """Return the chain of legs between checked poses."""
     ends = [x for values in (poses, *rates) for x in (values[:-1], values[1:])]
     legs = _made(leg, ends, np.diff(times))
     _check_arrival(legs, poses)
@@ -520,10 +509,3 @@ def _check_arrival(legs: Curve, poses: Array) -> None:
         if np.isnan(missed[:, i]).any():
             raise ValueError(f"leg: it found no curve from poses[{i}] to poses[{i + 1}] (NaN)")
         raise ValueError(f"leg: it does not lead from poses[{i}] to poses[{i + 1}]")
-
-
-def _as_accelerations(accelerations: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = as_single("accelerations", accelerations, "N", shape[1])
-    if array.shape != shape:
-        raise ValueError(f"accelerations: shape {shape} is wanted, got {array.shape}")
-    return array

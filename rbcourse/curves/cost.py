@@ -40,19 +40,18 @@ def acceleration_cost(curve: Curve, *, body: Body | None = None, rtol: float = 1
         The body that moves along the curve: one for all curves of a stack, or one for each curve.
         The default is ``curve.body``. On SO(3), only its inertia matters.
     rtol : float, optional
-        The relative error, from 1e-12 to 0.1. If `rtol` is at least 1e-8, the quadrature starts
-        with two panels instead of 16 or more. The quadrature is then 3 to 40 times as fast, but may
-        miss a peak narrower than a hundredth of the interval.
+        The relative error, from 1e-12 to 0.1. From 1e-8 on, the quadrature is 3 to 40 times as
+        fast, but may miss a peak narrower than a hundredth of the interval.
 
     Returns
     -------
     ndarray, shape curve.batch_shape
         ∫ τᵀ G⁻¹ τ dt with the torque τ = G w' + w × G w. On SE(3), ∫ m ‖d_c''‖² dt is added, where
         d_c is the position of the centre of mass. For the ball, the cost is ∫ 2 ‖w'‖² dt, and on
-        SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. The relative error is `rtol`. For tiny costs, the absolute
-        error is 1e-20 times a third of the trace of G (2e-20 for the ball). The errors may be
-        larger if the acceleration has peaks or ripples that are narrower than a hundredth of the
-        interval, for example if the ``f`` of a `projected_line` changes abruptly.
+        SE(3) ∫ (2 ‖w'‖² + ‖d''‖²) dt. For tiny costs, the absolute error is 1e-20 times a third of
+        the trace of G (2e-20 for the ball). The errors may be larger if the acceleration has peaks
+        or ripples that are narrower than a hundredth of the interval, for example if the ``f`` of a
+        `projected_line` changes abruptly.
 
     Raises
     ------
@@ -63,9 +62,8 @@ def acceleration_cost(curve: Curve, *, body: Body | None = None, rtol: float = 1
     Notes
     -----
     The vector G⁻¹τ is the covariant acceleration in the metric G, and τᵀ G⁻¹ τ is its squared norm.
-    Free motions have the cost 0. On SE(3), the cost is a sum of two parts
-    (`acceleration_cost_parts`). This sum depends on the unit of length. Ratios of such sums also
-    depend on it, unless inertia and mass are those of a body.
+    Free motions have the cost 0. On SE(3), the sum (of the `acceleration_cost_parts`) depends on
+    the unit of length, and so do ratios of sums, unless inertia and mass are those of a body.
 
     Examples
     --------
@@ -87,7 +85,6 @@ def acceleration_cost_parts(
 ) -> tuple[Array, Array]:
     """Return the two parts of `acceleration_cost`: rotation and translation.
 
-    The errors are those of `acceleration_cost`.
     Source: BK (18); for other inertias, beyond BK 1.
 
     Parameters
@@ -226,7 +223,7 @@ def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float =
 
 
 def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Array:
-    """Return ‖d_c''‖² for the point r of the body: Rᵀ d_c'' = Rᵀ d'' + w' × r + w × (w × r)."""
+    """Return ‖d_c''‖² for the point r of the body."""
     a = curve.values(t, 2)
     moved = a[..., 3:]
     if r.any():
@@ -238,10 +235,9 @@ def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Arr
 def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> Array:
     """Integrate `density` over unit time for each curve of a stack, by adaptive quadrature.
 
-    Each curve has its own panels. A panel is halved while the Clenshaw–Curtis rules with 9 and 17
-    nodes differ by more than `rtol` times the integral. ``density(some, t, index)`` returns the
-    integrand at the times t, shape (T, K), for the K curves `some`, whose indices in the stack are
-    `index`. Error messages begin with `name`.
+    A panel is halved while the Clenshaw–Curtis rules with 9 and 17 nodes differ by more than `rtol`
+    times the integral. ``density(some, t, index)`` returns the integrand at the times t, shape
+    (T, K), for the K curves `some`, whose indices in the stack are `index`.
     """
     if not 1e-12 <= as_single("rtol", rtol) <= 0.1:
         raise ValueError(f"rtol: a number from 1e-12 to 0.1 is wanted, got {rtol}")

@@ -8,12 +8,8 @@ Vary a curve R(t) to R exp(η̂), where η is a small function of time. Then w c
 
 where η = η' = 0 at both ends, and for the jerk also η'' = 0. The integral is
 ±∫ (−p' − w × p) · η dt. It is 0 for every η if p' + w × p = 0. Since (R p)' = R (p' + w × p), a
-curve is stationary if and only if
-
-    R p = c    is constant.
-
-This is Noether's theorem: R p is conserved, since rotations of the fixed frame do not change the
-cost.
+curve is stationary if and only if R p = c is constant. This is Noether's theorem: rotations of the
+fixed frame do not change the cost.
 """
 
 from __future__ import annotations
@@ -28,12 +24,11 @@ from rbcourse.so3 import hat
 Functional: TypeAlias = "BallAcceleration | Effort | Jerk"
 """A number times ∫ ‖u‖² dt for a stack of problems.
 
-The rates w, w', … have the shape (N, n, 3), for N problems and n times. The method `deviation`
-returns u, and `p` returns p. `deviation_by` and `p_by` return their derivatives with respect to the
-rates, as lists of 3 × 3 matrices, shape (N, n, 3, 3); the first one is the derivative with respect
-to w. `momenta` returns the momenta, shape (N, n, 3) or, for the jerk, (N, n, 6), and their
-derivatives. If the end values of an optimum change by δ, ∫ ‖u‖² dt changes by momenta · δ at t = 1,
-minus momenta · δ at t = 0.
+The rates w, w', … have the shape (N, n, 3), for N problems and n times. `deviation` returns u, and
+`p` returns p. `deviation_by` and `p_by` return their derivatives with respect to w, w', …, as lists
+of matrices, shape (N, n, 3, 3). `momenta` returns the momenta, shape (N, n, 3) or, for the jerk,
+(N, n, 6), and their derivatives. If the end values of an optimum change by δ, ∫ ‖u‖² dt changes by
+momenta · δ at t = 1, minus momenta · δ at t = 0. `take` selects some of the problems.
 
 Attributes
 ----------
@@ -53,7 +48,6 @@ class BallAcceleration:
     """The functional 2 ∫ ‖w'‖² dt: the squared covariant acceleration of a ball (G = 2 I).
 
     Here u = w' and p = w''. The optimum has R w'' = c.
-
     Source: BK (18), BK (19).
     """
 
@@ -83,15 +77,15 @@ class BallAcceleration:
 
     def p_by(self, w: Array, a: Array, b: Array) -> list[Array]:
         """Return the derivatives of w'' with respect to w, w' and w''."""
-        return [*self.deviation_by(w, a)[:1] * 2, *self.deviation_by(w, a)[1:]]
+        zero, one = self.deviation_by(w, a)
+        return [zero, zero, one]
 
 
 class Effort:
     """The functional ∫ τᵀ M τ dt, where τ = G w' + w × G w is the torque on a body of inertia G.
 
     If M = G⁻¹, the product M τ = w' + G⁻¹ (w × G w) is the covariant acceleration ∇_V V in the
-    metric G of the kinetic energy, and τᵀ M τ is its squared norm. If M = I, τᵀ M τ is the squared
-    norm of the torque. With v = M τ and h = G w,
+    metric G of the kinetic energy, and τᵀ M τ is its squared norm. With v = M τ and h = G w,
 
         p = G (v' + w × v) − h × v.
 
@@ -101,10 +95,9 @@ class Effort:
     Parameters
     ----------
     G : ndarray, shape (N, 3, 3)
-        The inertia, symmetric and positive definite. It is divided by a third of its trace, so that
-        the unit of inertia does not matter.
+        The inertia. It is divided by a third of its trace, so that its unit does not matter.
     of_torque : bool
-        True if M is I, and False if M is G⁻¹.
+        True if M is I (the squared torque), and False if M is G⁻¹.
     """
 
     ends = 2

@@ -17,8 +17,7 @@ velocity of the origin in the body frame, B = Q.
 
 Park and Ravani (Smooth invariant interpolation of rotations, 1997) construct invariant curves with
 continuous acceleration and nearly least cost. McEnnan's quaternion spline (2003) and SciPy's
-`RotationSpline` have cubic rotation vectors and solve a nonlinear system by iteration. In the
-literature, we found no linear system for the velocities.
+`RotationSpline` solve a nonlinear system by iteration. We found no linear system in the literature.
 """
 
 from __future__ import annotations
@@ -90,10 +89,9 @@ def spline_velocities(
 
     Notes
     -----
-    If the poses are moved, the velocities move with them; if the times are reversed, the velocities
-    are those of the reversed path. For rotations about one axis by small angles, the velocities are
-    those of SciPy's ``CubicSpline``. Singular set: successive poses a half-turn apart (up to 1e-6)
-    raise ValueError.
+    If the poses are moved or the times are reversed, the velocities are those of the new path. For
+    rotations about one axis by small angles, the velocities are those of SciPy's ``CubicSpline``.
+    Singular set: successive poses a half-turn apart (up to 1e-6) raise ValueError.
 
     Examples
     --------
@@ -110,7 +108,8 @@ def spline_velocities(
 
 def cubic_velocities(times: Array, poses: Array, conditions: Conditions, body: Body) -> Array:
     """Compute `spline_velocities` without checks."""
-    h, R, given = np.diff(times), poses[:, :3, :3], conditions.given
+    h, R = np.diff(times), poses[:, :3, :3]
+    given = conditions.given
     w = _rotation_system(h, R, body).solve(conditions._replace(given=given[:, :3]))
     if poses.shape[-1] == 3:
         return w
@@ -121,19 +120,18 @@ def path_velocities(h: Array, poses: Array, w: Array, conditions: Conditions, r:
     """Return v = Rᵀ d' at the poses; the point r of the body moves on a cubic spline."""
     R = poses[:, :3, :3]
     given = conditions.given[:, 3:] + np.cross(conditions.given[:, :3], r)
-    system = path_system(h, R, poses[:, :3, 3] + R @ r)
+    chords = np.diff(poses[:, :3, 3] + R @ r, axis=0)
+    loads = matvec(R[:-1].mT, chords), matvec(R[1:].mT, chords)
+    system = _cubic_system(h, np.eye(3), R[:-1].mT @ R[1:], *loads)
     return system.solve(conditions._replace(given=given)) - np.cross(w, r)
 
 
 class Conditions(NamedTuple):
-    """End conditions: `given` values, shape (N, m), at the knots that are `fixed`; 0 elsewhere.
-
-    If `periodic`, no value is given, and the values at the first and the last knot are equal.
-    """
+    """End conditions: `given` values, shape (N, m), at the knots that are `fixed`; 0 elsewhere."""
 
     fixed: NDArray[np.bool_]
     given: Array
-    periodic: bool = False
+    periodic: bool = False  # then the values at both ends are equal, and none is given
 
 
 class KnotSystem(NamedTuple):
@@ -214,13 +212,6 @@ def _rotation_system(h: Array, R: Array, body: Body) -> KnotSystem:
     return _cubic_system(h, G, B, _skew(Q @ W), -_skew(Q.mT @ W))
 
 
-def path_system(h: Array, R: Array, d: Array) -> KnotSystem:
-    """Return the system of the velocities v = Rᵀ d' of the origin."""
-    chords = np.diff(d, axis=0)
-    loads = matvec(R[:-1].mT, chords), matvec(R[1:].mT, chords)
-    return _cubic_system(h, np.eye(3), R[:-1].mT @ R[1:], *loads)
-
-
 def quaternion_system(h: Array, R: Array, long: NDArray[np.bool_] | bool = False) -> KnotSystem:
     """Return the system for unit quaternions; legs for which `long` is True turn the long way."""
     q = np.where(long, -1, 1)[..., None] * quaternion_of(R[:-1].mT @ R[1:])
@@ -236,7 +227,13 @@ def as_ends(
     ends: PathEnds, count: int, size: int, rest_at: Sequence[int] | NDArray[np.integer] = ()
 ) -> Conditions:
     """Return the end conditions for `count` knots, with `size` values at each."""
-    fixed, given = _rests(rest_at, count), np.zeros((count, size))
+    fixed, given = np.zeros(count, bool), np.zeros((count, size))
+    try:
+        fixed[[index(i) for i in rest_at]] = True
+    except (TypeError, IndexError) as error:
+        raise ValueError(
+            f"rest_at: indices of the {count} poses are wanted, got {rest_at!r}"
+        ) from error
     if isinstance(ends, str):
         if ends not in ("natural", "rest", "periodic"):
             word: str = ends
@@ -265,26 +262,14 @@ def _end_rate(name: str, value: ArrayLike, size: int) -> Array:
     return rate
 
 
-def _rests(rest_at: Sequence[int] | NDArray[np.integer], count: int) -> NDArray[np.bool_]:
-    rests = np.zeros(count, bool)
-    try:
-        rests[[index(i) for i in rest_at]] = True
-    except (TypeError, IndexError) as error:
-        raise ValueError(
-            f"rest_at: indices of the {count} poses are wanted, got {rest_at!r}"
-        ) from error
-    return rests
-
-
 @described_by(spline_velocities)
 def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     """Return velocities from parabolas; each parabola joins a pose to its two neighbours.
 
     A change of one pose affects only the velocities at this pose and at its neighbours. But the
-    acceleration jumps at the poses. For random rotations at equally spaced times, the median excess
-    of the cost over the optimum is 14 to 15 %, however small the steps are. The `spline_velocities`
-    have neither drawback. If the poses are samples of a smooth motion, doubling their number
-    divides the excess over the optimum (with the same end velocities) by 4.
+    acceleration jumps at the poses, and for random rotations at equally spaced times, the median
+    excess of the cost over the optimum is 14 to 15 %, however small the steps are. For samples of a
+    smooth motion, doubling their number divides the excess by 4.
 
     Parameters
     ----------
@@ -298,11 +283,10 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
 
     Notes
     -----
-    This is Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). For the origin, it
-    is a parabola in R³. For the rotation, it is a parabola in exponential coordinates about the
-    middle pose, so that the velocities move with the poses. At the first and the last pose, the
-    parabola of the neighbour gives the velocity. For two poses, the velocity is constant.
-    Singular set: neighbours that are a half-turn apart (up to 1e-6) raise ValueError.
+    This is Bessel's choice (de Boor, A Practical Guide to Splines, chapter IV). For rotations, the
+    parabolas are in exponential coordinates about the middle pose. At the first and the last pose,
+    the parabola of the neighbour gives the velocity. For two poses, the velocity is constant.
+    Singular set: that of `spline_velocities`.
 
     Examples
     --------

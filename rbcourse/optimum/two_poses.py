@@ -50,9 +50,9 @@ def minimum_acceleration(
     -------
     Optimum
         A `Curve` that meets all boundary conditions. Its ``cost`` is the `acceleration_cost`, the
-        lowest that was found. For a ball, R w'' is the constant ``c``. For a body, ``c`` is the
-        constant R p of the costate p. For poses, the ``rotation`` is the optimum for rotations, and
-        the centre of mass moves on a cubic.
+        lowest that was found; ``c`` is the constant R w'' (for a body, R p of the costate p). For
+        poses, the ``rotation`` is the optimum for rotations, and the centre of mass moves on a
+        cubic.
 
     Raises
     ------
@@ -65,13 +65,6 @@ def minimum_acceleration(
         If Newton's method does not converge for some problems of a stack (their curves are NaN), or
         if a starting curve costs less than the returned curve. In both cases, ``converged`` is
         False for the problem.
-
-    See Also
-    --------
-    rbcourse.textbook.minimum_acceleration : The equation, solved by SciPy's `solve_bvp`.
-    rbcourse.textbook.shoot : The same optimum by shooting.
-    rbcourse.closed_forms.corrected_bezier : A near-optimal formula.
-    excess_estimate : An estimate of the excess.
 
     Notes
     -----
@@ -87,7 +80,8 @@ def minimum_acceleration(
     bodies. For very thin rods, the method may not converge. If the end velocities are along the
     geodesic, the optimum is R0 exp(σ̂ p(t)), where p is a cubic and σ is a logarithm of R0ᵀR1 (not
     always the shortest logarithm). For poses, the mass changes the cost of the motion, but not the
-    motion. `projected_cubic` is near-optimal and has a closed form.
+    motion. `closed_forms.corrected_bezier` and `projected_cubic` are near-optimal, and
+    `rbcourse.textbook` solves (19) by SciPy's `solve_bvp` and by shooting.
 
     Examples
     --------
