@@ -228,7 +228,6 @@ class Path:
 
 
 def _surveyed(curve: Curve, ends: Array) -> Path:
-    """Return the legs of a path, and its stops; `ends` are the values of x at both ends."""
     if isinstance(curve, Chain):
         legs, knots = curve.legs.flat, curve.times
     else:
@@ -344,7 +343,6 @@ class Cells:
         return f"near s = {self.s[cell]:.6g}"
 
     def _sampled(self, part: slice, places: Array) -> Triple:
-        """Return V, A and R at places in the cells, shape (places, cells, ...)."""
         start, end = self.share[:, part, None]
         shares = start * (1 - places) + end * places
         own = np.repeat(self.leg[part], len(places))

@@ -20,14 +20,12 @@ from rbcourse._numerics import BLOCK, EPS, Array, blocks
 from rbcourse.body import Body
 from rbcourse.curves.closed import quaternion_cubic
 from rbcourse.curves.curve import Curve, Order, SingularTime, moved_rates
-from rbcourse.curves.ends import as_body
 from rbcourse.curves.projected import projected_cubic
 from rbcourse.curves.rigid import Joined, Position
 from rbcourse.curves.velocities import (
     PathEnds,
     as_ends,
     checked_path,
-    cubic_velocities,
     path_velocities,
     quaternion_system,
     spline_velocities,
@@ -153,10 +151,8 @@ def projected_spline(
     (array([[0., 0., 0.]]), array([[0., 0., 0.],
            [0., 0., 0.]]))
     """
-    times, poses, _ = checked_path(times, poses)
-    body, size = as_body(body, Body.ball()), 3 * poses.shape[-1] - 6
-    w = cubic_velocities(times, poses, as_ends(ends, len(poses), size, rest_at), body)
-    return _chain(partial(projected_cubic, body=body), times, poses, w)
+    velocities = spline_velocities(times, poses, ends, rest_at=rest_at, body=body)
+    return chain(times, poses, velocities, leg=partial(projected_cubic, body=body))
 
 
 @described_by(spline_velocities)
@@ -236,9 +232,16 @@ def joined(rotation: Curve, position: Position) -> Curve:
             "rotation: it is a Timed; join its path and the position, then call fastest"
         )
     _check_position(position, rotation.domain)
+    turns = rotation
+    first = np.array(rotation.domain[0])
+    if isinstance(rotation, Chain):
+        turns, first = rotation.legs, rotation.times[:-1]
+    T = turns.duration
+    legs = Joined(
+        duration=T, body=rotation.body, rotation=turns, position=position, first=first, span=T
+    )
     if not isinstance(rotation, Chain):
-        return _joined(rotation, position, np.array(rotation.domain[0]))
-    legs = _joined(rotation.legs, position, rotation.times[:-1])
+        return legs
     chain = Chain(
         duration=rotation.duration,
         body=rotation.body,
@@ -272,17 +275,6 @@ def _check_position(position: Position, domain: tuple[float, float]) -> None:
     if jumps.any():
         where = inner[np.argmax(jumps.any(axis=-1))]
         raise ValueError(f"position: its velocity jumps at t = {where}; a smooth path is wanted")
-
-
-def _joined(rotation: Curve, position: Position, first: Array) -> Joined:
-    return Joined(
-        duration=rotation.duration,
-        body=rotation.body,
-        rotation=rotation,
-        position=position,
-        first=first,
-        span=rotation.duration,
-    )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -458,7 +450,6 @@ def _at_ends(legs: Curve, order: Order) -> Array:
 
 
 def _chain(leg: Leg, times: Array, poses: Array, *rates: Array) -> Chain:
-    """Return the chain of legs between checked poses."""
     ends = [x for values in (poses, *rates) for x in (values[:-1], values[1:])]
     legs = _made(leg, ends, np.diff(times))
     _check_arrival(legs, poses)

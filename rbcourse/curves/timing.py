@@ -18,7 +18,7 @@ from rbcourse._checks import as_single, as_time
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, blocks
 from rbcourse.body import Body
-from rbcourse.curves._cells import BENDS, BLOCK, Limit, as_limits, fastest_motion
+from rbcourse.curves._cells import BENDS, BLOCK, as_limits, fastest_motion
 from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.ends import as_body
@@ -56,8 +56,7 @@ def fastest(
     Parameters
     ----------
     curve : Curve
-        A single curve. Only its path is used; its times do not matter. For a `Timed`, this is the
-        path from which it was made.
+        A single curve, of which only the path is used; for a `Timed`, that from which it was made.
     body : Body, optional
         The body that moves, by default ``curve.body``. It is required for a limit on the torque or
         the force if the body of the curve is the default ball. Its centre is the point whose speed
@@ -76,11 +75,10 @@ def fastest(
         angular_acceleration, acceleration : float or array_like, shape (3,)
             The largest norms of ω', and of the acceleration of the centre.
         torque, force : float or array_like, shape (3,)
-            The largest norms of the torque G ω' + ω × G ω and of the force. The force is the mass
-            times the acceleration of the centre, minus the weight.
+            The largest norms of the torque G ω' + ω × G ω and of the force: the mass times the
+            acceleration of the centre, minus the weight.
         gravity : array_like, shape (3,)
-            The acceleration of free fall in the fixed frame, by default 0, for a limit on the
-            force.
+            The acceleration of free fall in the fixed frame, by default 0, for the force.
 
     Returns
     -------
@@ -111,11 +109,9 @@ def fastest(
     about 50 ms for 1,000 cells, and a time and a memory in proportion for more. If it takes more
     than 10 s, lines on stderr show its progress.
 
-    The result depends only on the path: neither a shift of its times nor another unit of time
-    changes T. The motion stops where the path rests or its velocity jumps, and legs in which the
-    path stands still take no time. The acceleration jumps where that of the path jumps, at stops,
-    and between cells; the jerk is not limited. If noise bends the path between the poses, the
-    motion follows the noise, and is slow.
+    The motion stops where the path rests or its velocity jumps, and legs in which the path stands
+    still take no time. The acceleration jumps where that of the path jumps, at stops, and between
+    cells; the jerk is not limited. If noise bends the path, the motion follows it, and is slow.
 
     Examples
     --------
@@ -168,12 +164,19 @@ def limits_used(
     known = as_limits(curve, body, **limits)
     path = _from_zero(curve)
     t = _moments(path)
-    used: dict[str, tuple[float, float]] = {}
-    for name, shares in _shares(path, known, t).items():
-        largest = float(shares.max())
-        first = np.argmax(shares >= largest * (1 - PLATEAU))
-        used[name] = largest, float(t[first]) + curve.domain[0]
-    return used
+    shares = np.empty((len(known), len(t)))
+    for part in blocks(len(t), BLOCK):
+        V = path(t[part], 1)
+        A = path(t[part], 2)
+        R = path(t[part])[:, :3, :3]
+        for i, limit in enumerate(known):
+            _, b, k = limit.vectors(V, A, R)  # s' = 1 and s'' = 0
+            shares[i, part] = limit.share(b + k)
+    largest = shares.max(axis=1)
+    first = np.argmax(shares >= largest[:, None] * (1 - PLATEAU), axis=1)
+    when = t[first] + curve.domain[0]
+    names = [limit.name for limit in known]
+    return dict(zip(names, zip(largest.tolist(), when.tolist(), strict=True), strict=True))
 
 
 def _moments(curve: Curve) -> Array:
@@ -187,18 +190,6 @@ def _moments(curve: Curve) -> Array:
     return np.unique([*t, *starts, *middles, *np.maximum(starts, ends)])
 
 
-def _shares(curve: Curve, limits: list[Limit], t: Array) -> dict[str, Array]:
-    shares: dict[str, Array] = {limit.name: np.empty(len(t)) for limit in limits}
-    for part in blocks(len(t), BLOCK):
-        V = curve(t[part], 1)
-        A = curve(t[part], 2)
-        R = curve(t[part])[:, :3, :3]
-        for limit in limits:
-            _, b, k = limit.vectors(V, A, R)  # s' = 1 and s'' = 0
-            shares[limit.name][part] = limit.share(b + k)
-    return shares
-
-
 def _from_zero(curve: Curve) -> Curve:
     """Return the curve with times that begin at 0; large times would lose digits in differences."""
     if isinstance(curve, Chain):
@@ -208,18 +199,16 @@ def _from_zero(curve: Curve) -> Curve:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Timed(Curve):
-    """The `Curve` c(s(t)) on [0, T], with constant s'' in each cell.
-
-    At the end of a cell, the s'' of the next cell is used.
+    """The `Curve` c(s(t)) on [0, T], with constant s'' in each cell, from its start on.
 
     Attributes
     ----------
     curve : Curve
         The path c. For a chain, s = 0 is its first time.
     s, rate, times : ndarray, shape (N,)
-        The grid points, the values of s' there, and the times at which the curve passes them. The
-        curve passes the pose at s0 of the path at ``times[np.searchsorted(s, s0)]``. At a stop, s'
-        jumps, and two grid points have the same time.
+        The grid points, the values of s' there, and the times at which the curve passes them. It
+        passes the pose at s0 of the path at ``times[np.searchsorted(s, s0)]``. At a stop, s' jumps,
+        and two grid points have the same time.
     """
 
     curve: Curve

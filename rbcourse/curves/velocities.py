@@ -103,14 +103,10 @@ def spline_velocities(
     """
     times, poses, _ = checked_path(times, poses)
     conditions = as_ends(ends, len(poses), 3 * poses.shape[-1] - 6, rest_at)
-    return cubic_velocities(times, poses, conditions, as_body(body, Body.ball()))
-
-
-def cubic_velocities(times: Array, poses: Array, conditions: Conditions, body: Body) -> Array:
-    """Compute `spline_velocities` without checks."""
+    body = as_body(body, Body.ball())
     h, R = np.diff(times), poses[:, :3, :3]
-    given = conditions.given
-    w = _rotation_system(h, R, body).solve(conditions._replace(given=given[:, :3]))
+    turning = conditions._replace(given=conditions.given[:, :3])
+    w = _rotation_system(h, R, body).solve(turning)
     if poses.shape[-1] == 3:
         return w
     return np.concatenate([w, path_velocities(h, poses, w, conditions, body.centre)], axis=1)
@@ -200,7 +196,6 @@ def _cubic_system(h: Array, G: Array, B: Array, *loads: Array) -> KnotSystem:
 
 
 def _rotation_system(h: Array, R: Array, body: Body) -> KnotSystem:
-    """Return the system of the angular velocities."""
     Q = R[:-1].mT @ R[1:]
     if body.is_ball:
         load = _skew(Q) / 2

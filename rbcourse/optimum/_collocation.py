@@ -155,12 +155,10 @@ def _store(equations: Stationary, now: Iterates, found: Results) -> None:
 
 
 def take(record: Record, index: Any) -> Record:
-    """Return some of the problems of a record of arrays."""
     return record._make(x[index] for x in record)
 
 
 def joined(records: list[Record]) -> Record:
-    """Return one record of all problems of several records."""
     return records[0]._make(map(np.concatenate, zip(*records, strict=True)))
 
 
@@ -184,7 +182,6 @@ class Iterates(NamedTuple):
 
     @classmethod
     def start(cls, unknowns: Unknowns, number: Numbers, steps: Numbers) -> Self:
-        """Return the state before the first step on a set of nodes."""
         large = np.full(len(number), np.inf)
         no = np.zeros(len(number), bool)
         return cls(*unknowns, number, steps, left=large, turned=large, solved=no, finer=no)
@@ -206,7 +203,6 @@ class Iterates(NamedTuple):
         return self._replace(left=left, solved=solved, finer=finer)
 
     def stepped(self, equations: Stationary, step: Change) -> Self:
-        """Return the state after a step, of which at most `LONGEST_STEP` is made."""
         turned = np.linalg.norm(step.turn, axis=-1).max(axis=1)
         share = LONGEST_STEP / np.maximum(turned, LONGEST_STEP)
         R, k, c = equations.stepped(self.unknowns, step, share)
@@ -254,14 +250,12 @@ class Stationary:
         self.ends = ends
 
     def take(self, index: Any) -> Self:
-        """Return the equations of some of the problems."""
         some = copy(self)
         some.functional = self.functional.take(index)
         some.R0, some.R1, some.ends = self.R0[index], self.R1[index], self.ends[index]
         return some
 
     def nodes(self, n: int) -> tuple[int, ...]:
-        """Return the numbers of nodes on which to work: n, and those of `NODES` that are larger."""
         return n, *(more for more in NODES if more > n)
 
     def first(self, R: Array) -> Unknowns:
@@ -278,14 +272,12 @@ class Stationary:
         return Unknowns(R, k, c)
 
     def with_ends(self, R: Array) -> Array:
-        """Return R with the given rotations at the ends."""
         R = R.copy()
         R[:, 0] = self.R0
         R[:, -1] = self.R1
         return R
 
     def refined(self, now: Unknowns, n: int) -> Unknowns:
-        """Return the unknowns interpolated to n nodes."""
         R = self.with_ends(on_nodes(now.R, n))
         k = interpolation(now.k.shape[1], n) @ now.k
         return self.unknowns(R, k, now.c)
@@ -575,5 +567,4 @@ def cayley(turn: Array) -> Array:
 
 
 def _largest(values: Array) -> Array:
-    """Return the largest absolute entry of each problem."""
     return np.asarray(np.abs(values).max(axis=tuple(range(1, values.ndim))))

@@ -40,7 +40,6 @@ class Curves:
 
     @staticmethod
     def of(problem: Numbers, R: Array) -> Curves:
-        """Return curves of these problems, of unknown cost."""
         return Curves(problem, R, np.full(len(R), np.inf))
 
     @staticmethod
@@ -72,7 +71,6 @@ class Curves:
         return Curves(index[self.problem], self.R, self.cost)
 
     def on_nodes(self, n: int) -> Curves:
-        """Return the curves interpolated to n nodes, of unknown cost."""
         return Curves.of(self.problem, on_nodes(self.R, n))
 
     def with_ends(self, ends: Array) -> Curves:
@@ -272,7 +270,6 @@ def _continuous_log(R: Array) -> Array:
 
 
 def _beta(t: Array) -> Array:
-    """Return β = 3t² − 2t³, which rises from 0 to 1 and is flat at both ends."""
     return t * t * (3 - 2 * t)
 
 

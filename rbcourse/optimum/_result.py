@@ -29,6 +29,11 @@ _FOUND = [
 ]
 
 
+def _reported(name: str, doc: str) -> Any:
+    """Return a property of `Optimum`: a field of the report of its rotation."""
+    return property(lambda self: self._told(self.found.report[name]), doc=doc)
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Optimum(Curve):
     """A `Curve`, or a stack of curves, of least acceleration, torque or jerk.
@@ -41,10 +46,8 @@ class Optimum(Curve):
     cost : float
         The `acceleration_cost`, `torque_cost` or `jerk_cost` for the body of the curve.
     converged : bool
-        Whether a solution was found and no curve that was tried costs less. The solution is
-        stationary, but another curve may cost less; the functions that return optima tell for
-        which problems this was tested. If no solution was found, the curve, `c` and the cost are
-        NaN.
+        Whether a solution was found and no curve that was tried costs less; another curve may. If
+        no solution was found, the curve, `c` and the cost are NaN.
     certified : bool
         Whether the curve is proven to be a strict local minimum: all nearby curves with the same
         ends cost more. It is False for a saddle, for a curve that is NaN, and if the proof fails.
@@ -74,11 +77,6 @@ class Optimum(Curve):
         return self.found.cost
 
     @property
-    def converged(self) -> Any:
-        """Whether a solution was found and no curve that was tried costs less."""
-        return self._told(self.found.report["converged"])
-
-    @property
     def certified(self) -> Any:
         """Whether the curve is proven to be a strict local minimum of its cost."""
         return self._told(self.found.positive.copy())
@@ -88,15 +86,10 @@ class Optimum(Curve):
         """The constant R p in the fixed frame."""
         return self.found.constant / self.duration[..., None] ** (self.found.functional.ends + 1)
 
-    @property
-    def residual(self) -> Any:
-        """The largest error of the equations."""
-        return self._told(self.found.report["residual"])
-
-    @property
-    def iterations(self) -> Any:
-        """The number of steps of the solver."""
-        return self._told(self.found.report["iterations"])
+    converged = _reported("converged", "Whether a solution was found and no known one costs less.")
+    residual = _reported("residual", "The largest error of the equations.")
+    iterations = _reported("iterations", "The number of steps of the solver.")
+    nodes = _reported("nodes", "The number of nodes that represent the curve.")
 
     def _told(self, values: NDArray[Any]) -> Any:
         return values if self.batch_shape else values.item()
@@ -128,15 +121,11 @@ class OptimalRotation(Optimum):
     def cost(self) -> Any:
         return self._told(self.report["cost"] / self.duration ** (self.functional.ends + 1))
 
-    @property
-    def nodes(self) -> Any:
-        """The number of nodes that represent the curve."""
-        return self._told(self.report["nodes"])
-
     @cached_property
     def positive(self) -> NDArray[np.bool_]:
         """Whether the second variation is proven to be positive, shape (...)."""
-        return is_positive(self.flat).reshape(self.batch_shape)
+        proven = [is_positive(self.take([i])) for i in range(self.count)]
+        return np.array(proven, bool).reshape(self.batch_shape)
 
     def take(self, index: Any) -> Self:
         functional = self.functional.take(np.reshape(index, -1))
@@ -193,7 +182,7 @@ def optimum_of(
     duration: Array,
     body: Body,
 ) -> OptimalRotation:
-    """Return the solutions as a stack of curves; its batch shape is the shape of the durations."""
+    """Return the solutions as a stack of curves; its batch shape is that of the durations."""
     batch = duration.shape
     found, c = np.zeros(len(solutions), _FOUND), np.full((len(solutions), 3), np.nan)
     for i, one in enumerate(solutions):

@@ -135,7 +135,6 @@ class Search:
         return self.found
 
     def first_nodes(self) -> Numbers:
-        """Return the number of nodes on which the search begins, for each problem."""
         weights = np.array([1, 1, 1 / 6, 1 / 6])  # of w and w' in a quintic
         sizes = np.linalg.norm(self.ends, axis=-1)
         speed = sizes @ weights[: sizes.shape[1]]
@@ -321,7 +320,6 @@ def _across(w: Array, G: Array) -> Array:
 
 
 def ball(given: Ends) -> Task:
-    """Return the problems of minimum acceleration for a ball."""
     ends, rates = _flat(given)
     equations = BallStationary(ends.R0, ends.R1, rates)
     return Task(
@@ -394,7 +392,6 @@ def _on_nodes(results: Results, n: int) -> Curves:
 
 
 def jerk(given: Ends, a0: Array, a1: Array) -> Task:
-    """Return the problems of minimum jerk."""
     ends, rates = _flat(given, a0, a1)
 
     def start(problems: Numbers, n: int) -> Curves:

@@ -7,17 +7,16 @@ respect to s is
     ½ δ² ∫ L dt = ± ∫ δp · x + c · (ε' × ε) dt,    δp = Σ Pᵢ x⁽ⁱ⁾,  Pᵢ = ∂p/∂w⁽ⁱ⁾,
 
 where ± is − for the acceleration and the torque, and + for the jerk. It is the integral of
-L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾ plus terms with fewer derivatives; M is constant and positive
-definite. Each such x and its first k − 1 derivatives vanish at both ends, and ∫ R x dt = 0. If the
-second derivative is at least a positive multiple of ∫ L(x, x) dt for every such x, the curve is a
-strict local minimum.
+L(x, x) = x⁽ᵏ⁾ · M x⁽ᵏ⁾ plus terms with fewer derivatives; M is constant and positive definite. Each
+such x and its first k − 1 derivatives vanish at both ends, and ∫ R x dt = 0. If the second
+derivative is at least a positive multiple of ∫ L(x, x) dt for every such x, the curve is a strict
+local minimum. Three steps prove this, up to rounding, quadrature and the error of the curve.
 
-Three steps prove this, up to rounding, quadrature and the error of the computed curve. (1) A
-penalty, `_PENALTY` ‖∫ R x dt‖², is added, and the form must be positive also for x that violate
-∫ R x dt = 0. Then ε is the primitive of R x with ε(1) = −ε(0), so that the form is symmetric.
-(2) x is split into x₁ and x₂, where x₁⁽ᵏ⁾ is a polynomial of a degree below J, and x₂⁽ᵏ⁾ is
-orthogonal to such polynomials. In a basis of Legendre polynomials, the form for x₁ is a matrix Q.
-Successive integrations of x₂⁽ᵏ⁾ divide its norm by at least 2J − 1, 2J − 3, …, so the terms with
+(1) A penalty, `_PENALTY` ‖∫ R x dt‖², is added, and the form must be positive also for x that
+violate ∫ R x dt = 0. Then ε is the primitive of R x with ε(1) = −ε(0), so that the form is
+symmetric. (2) x is split into x₁ and x₂, where x₁⁽ᵏ⁾ is a polynomial of a degree below J, and x₂⁽ᵏ⁾
+is orthogonal to such polynomials. In a basis of Legendre polynomials, the form for x₁ is a matrix
+Q. Successive integrations of x₂⁽ᵏ⁾ divide its norm by at least 2J − 1, 2J − 3, …, so the terms with
 fewer derivatives are at most a share γ of ∫ L(x₂, x₂) dt. (3) The mixed terms are
 ∫ x₂⁽ᵏ⁾ · F x₁ dt, and only the part of F x₁ orthogonal to the polynomials contributes. Let E be the
 matrix of the inner products of these parts. The form is positive if γ < 1 and Q − E/(1 − γ) is
@@ -30,7 +29,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbcourse._chebyshev import Grid, grid
 from rbcourse._numerics import Array, matvec
@@ -56,12 +54,8 @@ def polynomials(m: int, k: int, nodes: int) -> list[Any]:
     return [legval(2 * grid(nodes).t - 1, c).T for c in made]
 
 
-def is_positive(curve: Any) -> NDArray[np.bool_]:
-    """Tell for which optimal rotations the second variation is proven to be positive."""
-    return np.array([_is_positive(curve.take([i])) for i in range(curve.count)], dtype=bool)
-
-
-def _is_positive(curve: Any) -> bool:
+def is_positive(curve: Any) -> bool:
+    """Tell whether the second variation of an optimal rotation, a stack of one, is proven to be positive."""
     if np.isnan(curve.constant).any():
         return False
     for m in _DEGREES:
@@ -72,9 +66,9 @@ def _is_positive(curve: Any) -> bool:
 
 
 def least_eigenvalues(curve: Any, m: int) -> tuple[float, float]:
-    """Return the least eigenvalues of Q and of Q − E/(1 − γ), with m polynomials for each axis.
+    """Return the least eigenvalues of Q and of Q − E/(1 − γ), which is −∞ if γ is 1 or more.
 
-    `curve` is a stack with one element. The second value is −∞ if γ is 1 or more.
+    There are m polynomials for each axis.
     """
     functional, k = curve.functional, curve.functional.ends // 2
     sign, J = (-1) ** k, m + k

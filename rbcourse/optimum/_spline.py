@@ -106,7 +106,6 @@ class Problem(NamedTuple):
         return np.where(self.ends.fixed[:, None], self.ends.given, values)
 
     def equations(self, values: Array, n: int) -> Stationary:
-        """Return the equations R p = c of the legs, for n nodes and values at the poses."""
         ends = self.R[:-1], self.R[1:], self.own(values)
         if not isinstance(self.functional, BallAcceleration):
             return Stationary(self.functional, *ends)
@@ -193,7 +192,6 @@ class Legs(NamedTuple):
 
     @property
     def left(self) -> float:
-        """The largest error."""
         return float(self.errors.largest.max())
 
     def stepped(self, step: Change, share: float) -> Unknowns:

@@ -46,13 +46,10 @@ def excess_estimate(curve: Curve) -> Array:
     Domain: ‖w‖ times the duration is below 2.5 rad at all times, and the excess is at most 1. On
     random problems with an excess of at least 1e-8, the estimates were within 1.4 % of the excess
     for closed forms, and within 7 % for quintics with random end accelerations. For problems with
-    ‖w‖ < 1 at all times, these figures were 0.04 % and 1.6 %. For a smaller excess, the computed
-    costs are not accurate enough for a comparison. An excess below 1e-22 is lost in rounding. If
-    ‖w‖ reaches 3π/4, the optimum may turn the other way round; the estimate is then the excess over
-    the nearby stationary curve.
-
-    The estimate is the decrement of one step of Newton's method for ∫ ‖w'‖² dt, over polynomials η
-    in R exp(η̂), divided by the cost that remains (docs/near_optimal.md, section 6).
+    ‖w‖ < 1 at all times, these figures were 0.04 % and 1.6 %. An excess below 1e-22 is lost in
+    rounding. If ‖w‖ reaches 3π/4, the optimum may turn the other way round; the estimate is then
+    the excess over the nearby stationary curve. The estimate is the decrement of one step of
+    Newton's method, divided by the cost that remains (docs/near_optimal.md, section 6).
 
     Examples
     --------
