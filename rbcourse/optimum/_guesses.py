@@ -133,36 +133,26 @@ def _between_control_points(ends: Ends, n: int) -> Curves:
 def _beside_free_end(ends: Ends, n: int, *accelerations: Array) -> Curves:
     """Return two curves for each problem that follow a motion whose end is free.
 
-    Let F be the motion from R0 whose velocity in the fixed frame is the line from R0 w0 to R1 w1
+    Let F be the motion from R0 whose velocity L in the fixed frame is the line from R0 w0 to R1 w1
     (or the cubic with the derivatives R0 a0 and R1 a1, if `accelerations` are given). It costs
-    least if the rotation at t = 1 is free. With β = 3t² − 2t³, the curves are
+    least if the rotation at t = 1 is free. From t to t + h, it turns by
+    ∫ L dt − h² (L(t) × L(t + h))/12, to fourth order in h. With β = 3t² − 2t³, the curves are
 
         R = F exp(β v̂),    v from F(1) to R1.
     """
     t = grid(n).t[:, None]
-    hint = _bounded(ends.w0) / 3 + _bounded(ends.w1) / 3
-    F = _with_free_end(ends, n, *accelerations)
-    v = _both_ways(F[:, -1].mT @ ends.R1, hint)
-    return Curves.for_each(F @ exp_so3(_beta(t) * v[:, :, None]))
-
-
-def _with_free_end(ends: Ends, n: int, *accelerations: Array) -> Array:
-    """Return the motion F of `_beside_free_end` at n nodes, shape (N, n, 3, 3).
-
-    With the velocity L in the fixed frame, a ball turns from t to t + h by
-    ∫ L dt − h² (L(t) × L(t + h))/12, to fourth order in h.
-    """
-    t = grid(n).t
-    h = np.diff(t)[:, None, None]
     rates = [_bounded(x) for x in (ends.w0, ends.w1, *accelerations)]
     in_room = [matvec(R, x) for R, x in zip((ends.R0, ends.R1) * 2, rates, strict=False)]
-    L = hermite(in_room, t[:, None, None])
+    L = hermite(in_room, t[..., None])
+    h = np.diff(t, axis=0)[..., None]
     integral = np.tensordot(grid(n).integral, L, axes=1)
     turns = np.diff(integral, axis=0) - h**2 / 12 * np.cross(L[:-1], L[1:])
-    F = [ends.R0]
+    steps = [ends.R0]
     for turn in exp_so3(turns):
-        F.append(turn @ F[-1])
-    return np.stack(F, axis=1)
+        steps.append(turn @ steps[-1])
+    F = np.stack(steps, axis=1)
+    v = _both_ways(F[:, -1].mT @ ends.R1, hint=rates[0] / 3 + rates[1] / 3)
+    return Curves.for_each(F @ exp_so3(_beta(t) * v[:, :, None]))
 
 
 def _both_ways(goal: Array, hint: Array) -> Array:
@@ -280,10 +270,9 @@ def _bounded(w: Array) -> Array:
 def spun(curves: Curves, ends: Array, G: Array, worth: Mask) -> Curves:
     """Return curves with more spin about the principal axes of the inertia G of each problem.
 
-    With γ = 10 t³ − 15 t⁴ + 6 t⁵, the new curves are R exp(φ ê) with φ = ±2π γ (a full turn), for
-    each principal axis e for which `worth` of the problem, shape (3,), is True. The axes are
-    ordered by their moments. About the first axis, the curves with φ = ±π (4 t (1 − t))³ (forth and
-    back) are added.
+    The new curves are R exp(φ ê) with φ = ±2π (10 t³ − 15 t⁴ + 6 t⁵), a full turn, for each
+    principal axis e that is `worth` it, and φ = ±π (4 t (1 − t))³, forth and back, for the first
+    axis. The axes are ordered by their moments.
     """
     t = grid(curves.nodes).t[:, None]
     turn = 2 * np.pi * t**3 * (10 - 15 * t + 6 * t**2)
@@ -329,21 +318,17 @@ def lowered(functional: Functional, curves: Curves, steps: Steps) -> Curves:
 
 def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
     each = np.arange(len(R))
-    shares = SHARES[:, None, None, None] * _best_change(functional, R)
-    tried = R @ cayley(shares)
+    bumps = _bumps(R.shape[1], functional.ends // 2 + 1)
+    J, u = gauss_newton(functional, R, bumps)
+    x = np.linalg.solve(J.mT @ J, -(J.mT @ u))
+    change = bumps[0] @ x.reshape(len(R), -1, 3)
+    tried = R @ cayley(SHARES[:, None, None, None] * change)
     of_tried = functional.take(np.tile(each, len(SHARES)))
     costs = cost_at_nodes(of_tried, tried.reshape(-1, *R.shape[1:]))
     tried = np.concatenate([R[None], tried])
     costs = np.vstack([cost, costs.reshape(-1, len(R))])
     best = np.fmin(costs, np.inf).argmin(axis=0)  # NaN counts as inf
     return tried[best, each], costs[best, each]
-
-
-def _best_change(functional: Functional, R: Array) -> Array:
-    bumps = _bumps(R.shape[1], functional.ends // 2 + 1)
-    J, u = gauss_newton(functional, R, bumps)
-    x = np.linalg.solve(J.mT @ J, -(J.mT @ u))
-    return bumps[0] @ x.reshape(len(R), -1, 3)
 
 
 def gauss_newton(functional: Functional, R: Array, shapes: list[Array]) -> tuple[Array, Array]:
