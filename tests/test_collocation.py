@@ -5,7 +5,7 @@ import pytest
 
 import rbcourse as rb
 from rbcourse._chebyshev import grid
-from rbcourse.curves.functionals import Effort
+from rbcourse.curves.functionals import BallAcceleration, Effort
 from rbcourse.optimum import _collocation as collocation
 
 
@@ -17,10 +17,10 @@ def test_one_singular_problem_does_not_affect_the_rest_of_a_stack(of_torque, sta
     R0, R1 = rb.sample_rotation((2, 4), rng=rng)
     rates = rng.normal(size=(4, 2, 3))
     R = rb.closed_forms.bezier(R0, R1, *rates.swapaxes(0, 1))(grid(17).t).swapaxes(0, 1)
-    solve, equations = collocation.relax_ball, collocation.BallStationary(R0, R1, rates)
+    solve = collocation.relax
+    equations = collocation.BallStationary(BallAcceleration(), R0, R1, rates)
     if of_torque:
         functional = Effort(np.stack([np.diag([1.0, 2, 2.5])] * 4), of_torque=True)
-        solve = collocation.relax
         equations = collocation.Stationary(functional, R0, R1, rates)
     alone = [solve(equations.take([i]), R[[i]])[0] for i in range(4)]
     R[broken] = start

@@ -13,7 +13,7 @@ import rbcourse as rb
 from rbcourse._chebyshev import grid
 from rbcourse._hermite import hermite
 from rbcourse.curves.ends import Ends
-from rbcourse.optimum._collocation import relax_ball
+from rbcourse.optimum._collocation import relax
 from rbcourse.optimum._search import ball
 
 MANY = random_problems(800, 50)
@@ -124,7 +124,7 @@ def test_extra_turns_in_either_direction_do_not_cost_less(best):
         between = (3 * t**2 - 2 * t**3) * (middle + 2 * np.pi * ways * axis)[:, None]
         with np.errstate(over="ignore", invalid="ignore"):
             R = rb.exp_so3(before) @ rb.exp_so3(between) @ rb.exp_so3(after)
-            costs = 2 * np.array([one.cost for one in relax_ball(equations, R)])
+            costs = 2 * np.array([one.cost for one in relax(equations, R)])
         assert np.all(costs > curves.cost * (1 - 1e-9))
 
 

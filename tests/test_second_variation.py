@@ -6,6 +6,7 @@ import rbcourse as rb
 from rbclassroom.atlas import random_problems
 from rbcourse._chebyshev import grid
 from rbcourse.curves.ends import Ends
+from rbcourse.optimum._collocation import relax
 from rbcourse.optimum._result import optimum_of
 from rbcourse.optimum._search import LIMITS, ball, body, jerk
 from rbcourse.optimum._second_variation import polynomials
@@ -29,7 +30,7 @@ def stationary(what, R, ends, G=BOOK, accelerations=(REST, REST)):
     else:
         task = ball(one)
     equations = task.equations
-    found = task.solver(equations, R[None])
+    found = relax(equations, R[None])
     return optimum_of(equations.functional, equations.ends, found, np.ones(1), rb.Body(G))
 
 

@@ -437,14 +437,6 @@ def _even_parts(counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.
     return run, np.minimum(first[:, None] + np.arange(length), ends[run, None] - 1)
 
 
-def smooth_parts(curve: Curve, name: str, order: Literal[1, 2]) -> Curve:
-    """Return the curve, or the legs of a chain that passes `Chain.check_smooth`."""
-    if isinstance(curve, Chain):
-        curve.check_smooth(name, order)
-        return curve.legs
-    return curve
-
-
 def _at_ends(legs: Curve, order: Order) -> Array:
     return legs.at_own_times(np.stack([0 * legs.duration, legs.duration]), order)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from rbcourse._checks import as_single, check_broadcast
 from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array, blocks
 from rbcourse.body import Body
-from rbcourse.curves.chain import smooth_parts
+from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve, SingularTime, which_curve
 from rbcourse.curves.ends import as_body
 from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
@@ -106,18 +106,18 @@ def acceleration_cost_parts(
     >>> float(rotation), float(translation.round(12))
     (0.0, 12.0)
     """
-    check_curve(curve, on_so3=False)
-    name, body = "acceleration cost", as_body(body, curve.body)
-    legs = smooth_parts(curve, name, 1)
+    name = "acceleration cost"
+    legs = smooth_legs(curve, name, 1, on_so3=False)
+    body = as_body(body, curve.body)
     functional: Functional = BallAcceleration()
     if not body.is_ball:
         functional = Effort(_inertias(curve, legs, body), of_torque=False)
-    rotation = rotation_cost(name, legs, functional, rtol)
+    rotation = _rotation_cost(name, curve, legs, functional, rtol)
     translation: Array = np.zeros(legs.count)
     if legs.size == 4:
         squared = partial(_squared_acceleration, body.centre)
         translation = body.mass * integral(name, legs, squared, rtol)
-    return summed(curve, rotation, legs, 3), summed(curve, translation, legs, 3)
+    return rotation, summed(curve, translation, legs, 3)
 
 
 @described_by(acceleration_cost)
@@ -144,11 +144,9 @@ def torque_cost(curve: Curve, *, body: Body | None = None, rtol: float = 1e-10) 
     >>> float(torque_cost(c, body=Body(np.diag([1.0, 2, 2.5]))).round(12))
     1.0
     """
-    check_curve(curve, on_so3=False)
-    legs = smooth_parts(curve, "torque cost", 1)
+    legs = smooth_legs(curve, "torque cost", 1, on_so3=False)
     inertias = _inertias(curve, legs, as_body(body, curve.body))
-    cost = rotation_cost("torque cost", legs, Effort(inertias, of_torque=True), rtol)
-    return summed(curve, cost, legs, 3)
+    return _rotation_cost("torque cost", curve, legs, Effort(inertias, of_torque=True), rtol)
 
 
 @described_by(acceleration_cost)
@@ -176,20 +174,22 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     >>> float(jerk_cost(c).round(9))  # 2 · 720 · 1.5²
     3240.0
     """
-    check_curve(curve)
-    legs = smooth_parts(curve, "jerk cost", 2)
-    cost = rotation_cost("jerk cost", legs, Jerk(), rtol)
-    return summed(curve, cost, legs, 5)
+    legs = smooth_legs(curve, "jerk cost", 2)
+    return _rotation_cost("jerk cost", curve, legs, Jerk(), rtol)
 
 
-def check_curve(curve: Curve, *, on_so3: bool = True) -> None:
-    """Raise ValueError unless the argument is a `Curve` (on SO(3), if `on_so3` is True)."""
+def smooth_legs(curve: Curve, name: str, order: Literal[1, 2], *, on_so3: bool = True) -> Curve:
+    """Return the curve, or the legs of a chain that passes `Chain.check_smooth`."""
     if not isinstance(curve, Curve):
         raise ValueError(f"curve: a Curve is wanted, got {type(curve).__name__}")
     if on_so3 and curve.size != 3:
         raise ValueError(
-            f"curve: a curve on SO(3) is wanted, got {curve!r}; rotations are poses[:, :3, :3]"
+            f"curve: a curve on SO(3), as of poses[:, :3, :3], is wanted, got {curve!r}"
         )
+    if not isinstance(curve, Chain):
+        return curve
+    curve.check_smooth(name, order)
+    return curve.legs
 
 
 def _inertias(curve: Curve, legs: Curve, body: Body) -> Array:
@@ -210,16 +210,17 @@ def summed(curve: Curve, costs: Array, legs: Curve, power: int) -> Array:
     return costs.sum() if legs is not curve else costs.reshape(curve.batch_shape)[()]
 
 
-def rotation_cost(name: str, curve: Curve, functional: Functional, rtol: float = 1e-10) -> Array:
-    """Return the cost of each curve's rotation, given a functional."""
-
+def _rotation_cost(
+    name: str, curve: Curve, legs: Curve, functional: Functional, rtol: float
+) -> Array:
     def density(some: Curve, t: Array, index: Index) -> Array:
         those = functional.take(index)
         rates = [some.values(t, order)[..., :3] for order in those.needs]
         u = those.deviation(*(np.moveaxis(rate, 0, 1) for rate in rates))
         return np.sum(u**2, axis=-1).T
 
-    return functional.scale * integral(name, curve, density, rtol)
+    costs = functional.scale * integral(name, legs, density, rtol)
+    return summed(curve, costs, legs, functional.ends + 1)
 
 
 def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Array:
@@ -232,7 +233,7 @@ def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Arr
     return np.sum(moved**2, axis=-1)
 
 
-def integral(name: str, curve: Curve, density: Density, rtol: float = 1e-10) -> Array:
+def integral(name: str, curve: Curve, density: Density, rtol: float) -> Array:
     """Integrate `density` over unit time for each curve of a stack, by adaptive quadrature.
 
     A panel is halved while the Clenshaw–Curtis rules with 9 and 17 nodes differ by more than `rtol`

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from rbcourse._chebyshev import along, grid, interpolation, primitives, tails
 from rbcourse._numerics import Array, blocks, scaled, solve
-from rbcourse.curves.functionals import BallAcceleration, Functional
+from rbcourse.curves.functionals import Functional
 from rbcourse.so3 import hat, vee
 
 TOGETHER = 64  # problems solved together, which bounds the memory: 80 MB a matrix on 129 nodes
@@ -79,14 +79,10 @@ def relax(equations: Stationary, R: Array) -> Results:
     """
     found: Results = []
     for some in blocks(len(R), TOGETHER):
-        found += _attempt(equations.take(some), R[some])
+        problems = equations.take(some)
+        problems.coarse = R.shape[1]
+        found += _attempt(problems, R[some])
     return found
-
-
-def relax_ball(equations: BallStationary, R: Array) -> Results:
-    """Solve problems of balls as `relax` does, with linear systems on the nodes of the given R."""
-    ends = equations.R0, equations.R1, equations.ends
-    return relax(BallStationary(*ends, coarse=R.shape[1]), R)
 
 
 def _attempt(equations: Stationary, R: Array) -> Results:
@@ -242,6 +238,8 @@ class Stationary:
 
     `ends` contains w0 and w1, and for the jerk also a0 and a1; its shape is (N, m, 3).
     """
+
+    coarse: int  # the number of nodes of the linear systems of `BallStationary`
 
     def __init__(self, functional: Functional, R0: Array, R1: Array, ends: Array) -> None:
         self.functional = functional
@@ -399,10 +397,6 @@ class BallStationary(Stationary):
     The linear systems are solved on a fixed number of nodes, `coarse`. This is 1.5 times as fast as
     `Stationary` for one problem, and 4.5 times as fast for stacks of 300.
     """
-
-    def __init__(self, R0: Array, R1: Array, ends: Array, coarse: int = 17) -> None:
-        super().__init__(BallAcceleration(), R0, R1, ends)
-        self.coarse = coarse
 
     def nodes(self, n: int) -> tuple[int, ...]:
         intervals = [(n - 1) * times for times in (1, 2, 4, 8, 16)]

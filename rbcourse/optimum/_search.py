@@ -27,7 +27,7 @@ from rbcourse._chebyshev import grid
 from rbcourse._numerics import EPS, Array
 from rbcourse.curves.bezier import corrected_bezier
 from rbcourse.curves.ends import Ends
-from rbcourse.curves.functionals import Effort, Jerk
+from rbcourse.curves.functionals import BallAcceleration, Effort, Jerk
 from rbcourse.optimum._collocation import (
     BallStationary,
     Failure,
@@ -38,7 +38,6 @@ from rbcourse.optimum._collocation import (
     on_nodes,
     rates_at_nodes,
     relax,
-    relax_ball,
 )
 from rbcourse.optimum._guesses import (
     SAME,
@@ -95,7 +94,6 @@ class Task(NamedTuple):
 
     equations: Stationary
     starts: Callable[[Numbers, int], Curves]  # curves of these problems (numbered 0, 1, …), n nodes
-    solver: Callable[[Any, Array], Results]  # Newton's method
     nodes: Any  # the number of nodes of starting curves, for all problems or for each one
     known: dict[int, Solution | Failure]  # known results; failures are ignored
 
@@ -185,7 +183,7 @@ class Search:
         Of two solutions of the same cost, the first is kept, so that rounding does not choose.
         """
         equations = self.task.equations.take(curves.problem)
-        solutions = self.task.solver(equations, curves.R)
+        solutions = relax(equations, curves.R)
         for i, one in zip(curves.problem, solutions, strict=True):
             best = self.found[i]
             if best is NOTHING or one.cost < (1 - SAME) * best.cost:
@@ -321,11 +319,10 @@ def _across(w: Array, G: Array) -> Array:
 
 def ball(given: Ends) -> Task:
     ends, rates = _flat(given)
-    equations = BallStationary(ends.R0, ends.R1, rates)
+    equations = BallStationary(BallAcceleration(), ends.R0, ends.R1, rates)
     return Task(
         equations=equations,
         starts=lambda problems, n: starts(ends.take(problems), n),
-        solver=relax_ball,
         nodes=LIMITS.nodes,
         known=_of_slow_ends(ends, equations),
     )
@@ -346,7 +343,7 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution |
         return {}
     curves = corrected_bezier(*ends.take(slow))
     R = curves(grid(LIMITS.nodes).t).swapaxes(0, 1)
-    found = relax_ball(equations.take(slow), np.ascontiguousarray(R))
+    found = relax(equations.take(slow), np.ascontiguousarray(R))
     return dict(zip(slow.tolist(), found, strict=True))
 
 
@@ -375,7 +372,6 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     return Task(
         equations=Stationary(functional, ends.R0, ends.R1, rates),
         starts=start,
-        solver=relax,
         nodes=np.where(is_rod, LIMITS.nodes_for_rods, LIMITS.nodes),
         known={i: of_balls[i] for i in np.flatnonzero(is_ball).tolist()},
     )
@@ -401,7 +397,6 @@ def jerk(given: Ends, a0: Array, a1: Array) -> Task:
     return Task(
         equations=Stationary(Jerk(), ends.R0, ends.R1, rates),
         starts=start,
-        solver=relax,
         nodes=LIMITS.nodes_for_jerk,
         known={},
     )

@@ -55,7 +55,7 @@ def polynomials(m: int, k: int, nodes: int) -> list[Any]:
 
 
 def is_positive(curve: Any) -> bool:
-    """Tell whether the second variation of an optimal rotation, a stack of one, is proven to be positive."""
+    """Tell whether the second variation is proven to be positive, for a stack of one curve."""
     if np.isnan(curve.constant).any():
         return False
     for m in _DEGREES:

@@ -6,8 +6,7 @@ import numpy as np
 
 from rbcourse._chebyshev import grid, tails
 from rbcourse._numerics import Array, blocks
-from rbcourse.curves.chain import smooth_parts
-from rbcourse.curves.cost import check_curve, summed
+from rbcourse.curves.cost import smooth_legs, summed
 from rbcourse.curves.curve import Curve
 from rbcourse.optimum._second_variation import on_each_axis, polynomials, products
 from rbcourse.so3 import hat
@@ -58,10 +57,9 @@ def excess_estimate(curve: Curve) -> Array:
     >>> float(excess_estimate(projected_cubic(*ends)).round(4))
     0.0197
     """
-    check_curve(curve)
+    legs = smooth_legs(curve, "excess estimate", 1)
     if not curve.body.is_ball:
         raise ValueError(f"curve: the estimate is for the ball, got {curve.body!r}")
-    legs = smooth_parts(curve, "excess estimate", 1)
     t, _, integral, _ = grid(_NODES)
     w, a = (np.moveaxis(legs.flat.values(t[:, None], order), 1, 0) for order in (1, 2))
     left_out = ~(np.linalg.norm(w, axis=-1).max(axis=1) < SPEED_LIMIT)

@@ -13,7 +13,7 @@ from rbcourse._numerics import Array
 from rbcourse.body import Body
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.ends import Ends, Given, Rate, as_body, between, on_rotations
-from rbcourse.optimum._collocation import EXACT, Failure
+from rbcourse.optimum._collocation import EXACT, Failure, relax
 from rbcourse.optimum._result import OptimalMotion, OptimalRotation, Optimum, optimum_of
 from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, jerk
 from rbcourse.optimum._search import body as of_body
@@ -245,7 +245,7 @@ def stationary(guess: Curve) -> Optimum:
     task = ball(Ends(R0, R1, w0, w1))
     R = np.moveaxis(unit(grid(LIMITS.nodes).t).reshape(LIMITS.nodes, -1, 3, 3), 0, 1)
     with np.errstate(over="ignore", invalid="ignore"):
-        found = task.solver(task.equations, R)
+        found = relax(task.equations, R)
         functional, ends = task.equations.functional, task.equations.ends
         return optimum_of(functional, ends, found, guess.duration, Body.ball())
 
