@@ -250,7 +250,7 @@ def inertia_from_weight(W: ArrayLike) -> Array:
            [0., 0., 2.]])
     """
     W = as_symmetric("W", W, 3)
-    return _trace_times_identity(W) - W
+    return np.trace(W, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - W
 
 
 @described_by(returns="(..., 3, 3)")
@@ -292,8 +292,3 @@ def _trace(X: ArrayLike, Y: ArrayLike, size: int | str) -> Array:
         )
     product: Array = (X * Y).sum(axis=(-2, -1))
     return product
-
-
-def _trace_times_identity(matrix: Array) -> Array:
-    trace: Array = np.trace(matrix, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
-    return trace

@@ -2,82 +2,44 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Self, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_array, as_duration, as_finite, check_all, check_broadcast
+from rbcourse._checks import as_array, as_duration, check_all, check_broadcast
 from rbcourse._numerics import Array, cross, matvec
-from rbcourse._valid import as_rotations, as_rotations_or_poses
+from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import Body
 
 Rate: TypeAlias = ArrayLike | None
 """A velocity or an acceleration at one end of a curve; None is 0."""
 
 
-class _Ends(NamedTuple):
-    R0: Array
-    R1: Array
-    w0: Array
-    w1: Array
-
-
-class Ends(_Ends):
+class Ends(NamedTuple):
     """Boundary conditions: rotations and angular velocities at both ends, in a common batch shape.
 
     `Ends` is a tuple, so that ``make(*ends)`` calls a function ``make`` with these arguments.
     Source: BK 6.2.
-
-    Parameters
-    ----------
-    R0, R1, w0, w1 : array_like, shapes (..., 3, 3) and (..., 3)
-        Rotation matrices and angular velocities.
-
-    Examples
-    --------
-    >>> from rbcourse import exp_so3
-    >>> ends = Ends(np.eye(3), exp_so3([[0, 0, 1], [0, 0, 1.5]]), [0, 0, 0], [0, 1, 0])
-    >>> ends.w1.shape
-    (2, 3)
     """
 
-    __slots__ = ()
-
-    def __new__(cls, R0: ArrayLike, R1: ArrayLike, w0: ArrayLike, w1: ArrayLike) -> Self:
-        """Check the arguments, and broadcast them to a common batch shape."""
-        R0 = as_rotations("R0", R0)
-        R1 = as_rotations("R1", R1)
-        w0 = as_finite("w0", w0, 3)
-        w1 = as_finite("w1", w1, 3)
-        batch = check_broadcast(R0=(R0, 2), R1=(R1, 2), w0=(w0, 1), w1=(w1, 1))
-        return cls._make((R0, R1, w0, w1)).broadcast_to(batch)
+    R0: Array
+    R1: Array
+    w0: Array
+    w1: Array
 
     @property
     def turn(self) -> Array:
         """The rotation R0ᵀ R1 from the start to the end."""
         return np.swapaxes(self.R0, -1, -2) @ self.R1
 
-    def over(self, duration: ArrayLike) -> tuple[Self, Array]:
-        """Return the ends rescaled to unit time, and the durations, in a common batch shape."""
-        T = as_duration("duration", duration)
-        batch = check_broadcast(ends=(self.R0, 2), duration=(T, 0))
-        T, (R0, R1, w0, w1) = np.broadcast_to(T, batch), self.broadcast_to(batch)
-        return type(self)._make((R0, R1, T[..., None] * w0, T[..., None] * w1)), T
-
-    def flat(self) -> Self:
+    def flat(self) -> Ends:
         """Return the ends with a single batch axis."""
-        return type(self)._make(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self)
+        return Ends(*(x.reshape(-1, *x.shape[self.w0.ndim - 1 :]) for x in self))
 
-    def broadcast_to(self, batch: tuple[int, ...]) -> Self:
-        """Return the ends, broadcast to another batch shape."""
-        shapes = (3, 3), (3, 3), (3,), (3,)
-        arrays = zip(self, shapes, strict=True)
-        return type(self)._make(np.broadcast_to(x, (*batch, *shape)) for x, shape in arrays)
-
-    def take(self, index: Any) -> Self:
+    def take(self, index: Any) -> Ends:
         """Return the ends that a NumPy index into the batch axes selects."""
-        return type(self)._make(x[index] for x in self)
+        return Ends(*(x[index] for x in self))
 
 
 class Given(NamedTuple):
@@ -130,7 +92,7 @@ def between(
         for i, rate in enumerate(rates.values())
     ]
     turning = [rate[..., :3] for rate in scaled]
-    ends = Ends._make((R0, R1, *turning[:2]))
+    ends = Ends(R0, R1, *turning[:2])
     if size == 3:
         return Given(ends, T, body, bends=tuple(turning[2:]))
     positions = (
