@@ -7,8 +7,18 @@ path is an array with one row for each state.
 
 Parameters
 ----------
-pose : array_like, shape (..., 3)
+pose, step : array_like, shape (..., 3)
     Poses (x, y, theta).
+start, goal : array_like, shape (..., 3)
+    Poses (x, y, theta) at both ends, in m, m and rad.
+A : array_like, shape (..., 3, 3)
+    Elements of SE(2), or matrices near them. The last row is not read.
+S : array_like, shape (..., 3)
+    Twists (vx, vy, omega), in m, m and rad for unit time; omega may have any size.
+steps : int, optional
+    The number of equal steps, at least 1.
+plan : iterable of (velocity, duration)
+    Velocities (vx, vy, vtheta) in m/s, m/s and rad/s, and durations of at least 0 in s.
 """
 
 from __future__ import annotations
@@ -66,7 +76,7 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
     return A
 
 
-@described_by(returns="(..., 3)")
+@described_by(__doc__, returns="(..., 3)")
 def planar_from_matrix(A: ArrayLike) -> Array:
     """Return the planar poses (x, y, theta) of matrices, with −π ≤ theta ≤ π.
 
@@ -74,11 +84,6 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     −a]], to which all rotations are equally near; theta is then 0. At θ = ±π, rounding decides the
     sign.
     Source: RR 3.1.
-
-    Parameters
-    ----------
-    A : array_like, shape (..., 3, 3)
-        Elements of SE(2), or matrices near them. The last row is not read.
 
     Examples
     --------
@@ -92,15 +97,11 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     return np.concatenate([A[..., :2, 2], theta[..., None]], axis=-1)
 
 
+@described_by(__doc__)
 def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     """Convert the pose `step` from the body frame of `pose` to the world frame.
 
     Source: RR 3.2.
-
-    Parameters
-    ----------
-    pose, step : array_like, shape (..., 3)
-        Poses (x, y, theta).
 
     Returns
     -------
@@ -134,17 +135,13 @@ def inverse_planar(pose: ArrayLike) -> Array:
     return np.concatenate([-_rotated(back, pose[..., :2]), back[..., None]], axis=-1)
 
 
+@described_by(__doc__)
 def exp_planar(S: ArrayLike) -> Array:
     """Return the pose to which the constant body twist S leads from (0, 0, 0) in unit time.
 
     The matrix of this pose is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]].
     There is no singular set; omega = 0 gives the translation exactly.
     Source: RR 3.2.
-
-    Parameters
-    ----------
-    S : array_like, shape (..., 3)
-        Twists (vx, vy, omega), in m, m and rad for unit time; omega may have any size.
 
     Returns
     -------
@@ -187,6 +184,7 @@ def log_planar(pose: ArrayLike) -> Array:
     return np.concatenate([chord / sinc(turn / 2), turn], axis=-1)
 
 
+@described_by(__doc__)
 def interpolate_planar(
     start: ArrayLike, goal: ArrayLike, steps: int = 10, *, shortest: bool = False
 ) -> Array:
@@ -200,10 +198,6 @@ def interpolate_planar(
 
     Parameters
     ----------
-    start, goal : array_like, shape (..., 3)
-        Poses (x, y, theta) at both ends, in m, m and rad.
-    steps : int, optional
-        The number of equal steps, at least 1.
     shortest : bool, optional
         Whether to turn by at most π (up to rounding). The last theta may then differ by full turns
         from the theta of `goal`. By default, theta changes from its given start to its given goal.
@@ -229,6 +223,7 @@ def interpolate_planar(
     return interpolate(start, goal, steps)
 
 
+@described_by(__doc__)
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
     """Return the poses, with full turns, at the start and after each command of a plan.
 
@@ -238,8 +233,6 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
     ----------
     start : array_like, shape (..., 3)
         Poses (x, y, theta) at the start, in m, m and rad.
-    plan : iterable of (velocity, duration)
-        Velocities (vx, vy, vtheta) in m/s, m/s and rad/s, and durations of at least 0 in s.
     frame : {"world", "body"}, optional
         The frame of vx and vy. With "world", a command adds its velocity times its duration. With
         "body", a command is a constant twist, which moves the body along an arc or a line

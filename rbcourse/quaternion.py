@@ -12,6 +12,8 @@ w : array_like, shape (..., 3)
     Rotation vectors, in rad.
 angles : array_like, shape (..., 3)
     Angles (yaw, pitch, roll), in rad.
+p : array_like, shape (..., 3)
+    Vectors.
 """
 
 from __future__ import annotations
@@ -294,11 +296,6 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     """Return rotated points: the vector part of q p q⁻¹.
 
     Source: RR 2.2.
-
-    Parameters
-    ----------
-    p : array_like, shape (..., 3)
-        Vectors.
 
     Examples
     --------

@@ -2,6 +2,17 @@
 
 Uniform means distributed by the Haar measure: multiplying a set of rotations by a rotation, from
 the left or the right, does not change the probability of the set.
+
+Parameters
+----------
+size : int or tuple of int, optional
+    The number of rotations, or a batch shape; by default one rotation, without a batch axis.
+rng : Generator, int or None, optional
+    A generator, a seed, or None for fresh numbers, as for `numpy.random.default_rng`.
+angle : array_like, shape (...)
+    The angle a, in [0, π].
+R : array_like, shape (n, 3, 3)
+    At least 100 rotation matrices, in the order of the draws.
 """
 
 from __future__ import annotations
@@ -92,17 +103,11 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
     return np.stack([w, np.sin(theta1) * sigma1, np.cos(theta1) * sigma1, z], axis=-1)
 
 
+@described_by(__doc__)
 def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random rotation matrices.
 
     Source: RR 2.1, RR (9), RR (10), RR (11).
-
-    Parameters
-    ----------
-    size : int or tuple of int, optional
-        The number of rotations, or a batch shape; by default one rotation, without a batch axis.
-    rng : Generator, int or None, optional
-        A generator, a seed, or None for fresh numbers, as for `numpy.random.default_rng`.
 
     Returns
     -------
@@ -249,17 +254,12 @@ class UniformityTest(NamedTuple):
     null: str
 
 
-@described_by(returns="(...)")
+@described_by(__doc__, returns="(...)")
 def angle_law(angle: ArrayLike) -> Array:
     """Return the probability (a − sin a)/π that a uniform rotation turns by at most a.
 
     The density is (1 − cos a)/π.
     Source: RR 2.
-
-    Parameters
-    ----------
-    angle : array_like, shape (...)
-        The angle a, in [0, π].
 
     Examples
     --------
@@ -270,15 +270,11 @@ def angle_law(angle: ArrayLike) -> Array:
     return a**3 * sine_gap_ratio(a) / np.pi
 
 
+@described_by(__doc__)
 def uniformity_tests(R: ArrayLike) -> dict[str, UniformityTest]:
     """Return statistics that test whether rotations are uniform and independent.
 
     Source: RR 2; J. Arvo, Fast random rotation matrices, Graphics Gems III, 1992.
-
-    Parameters
-    ----------
-    R : array_like, shape (n, 3, 3)
-        At least 100 rotation matrices, in the order of the draws.
 
     Returns
     -------

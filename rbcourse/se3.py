@@ -4,10 +4,22 @@ A twist is (ω, v): the angular velocity and the velocity of the origin, both in
 
 Parameters
 ----------
+R : array_like, shape (..., 3, 3)
+    Rotation matrices.
+d : array_like, shape (..., 3)
+    Positions in the fixed frame.
 A : array_like, shape (..., 4, 4)
     Poses.
+x : array_like, shape (..., 6)
+    Coordinates (σ, d).
 S : array_like, shape (..., 6)
-    Twists (ω, v).
+    Twists (ω, v), in rad and m per unit of time.
+matrix : array_like, shape (..., 4, 4)
+    The skew-symmetric part of its 3 × 3 block is used; the last row is ignored.
+w : array_like, shape (..., 3)
+    Angular velocities in the body frame.
+d_dot : array_like, shape (..., 3)
+    Velocities of the origin in the fixed frame.
 """
 
 from __future__ import annotations
@@ -29,18 +41,11 @@ from rbcourse.so3 import (
 )
 
 
-@described_by(returns="(..., 4, 4)")
+@described_by(__doc__, returns="(..., 4, 4)")
 def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     """Return the pose [[R, d], [0, 1]].
 
     Source: BK 2.1.
-
-    Parameters
-    ----------
-    R : array_like, shape (..., 3, 3)
-        Rotation matrices.
-    d : array_like, shape (..., 3)
-        Positions in the fixed frame.
 
     Examples
     --------
@@ -104,16 +109,11 @@ def inverse_se3(A: ArrayLike) -> Array:
     return join(Rt, -matvec(Rt, d))
 
 
-@described_by(returns="(..., 4, 4)")
+@described_by(__doc__, returns="(..., 4, 4)")
 def pose_from_coordinates(x: ArrayLike) -> Array:
     """Return the pose with rotation exp_so3(σ) and position d, in the fixed frame.
 
     Source: BK 2.5.
-
-    Parameters
-    ----------
-    x : array_like, shape (..., 6)
-        Coordinates (σ, d).
 
     Examples
     --------
@@ -162,16 +162,11 @@ def hat_se3(S: ArrayLike) -> Array:
     return matrix
 
 
-@described_by(returns="(..., 6)")
+@described_by(__doc__, returns="(..., 6)")
 def vee_se3(matrix: ArrayLike) -> Array:
     """Return the twist (ω, v) of a matrix [[ω̂, v], [0, 0]]: the inverse of `hat_se3`.
 
     Source: BK 2.1, BK (1).
-
-    Parameters
-    ----------
-    matrix : array_like, shape (..., 4, 4)
-        The skew-symmetric part of its 3 × 3 block is used; the last row is ignored.
 
     Examples
     --------
@@ -187,7 +182,7 @@ BASIS_SE3 = hat_se3(np.eye(6))
 BASIS_SE3.flags.writeable = False
 
 
-@described_by(returns="(..., 4, 4)")
+@described_by(__doc__, returns="(..., 4, 4)")
 def exp_se3(S: ArrayLike) -> Array:
     """Return the pose to which the constant twist S = (ω, v) leads from I in unit time.
 
@@ -195,11 +190,6 @@ def exp_se3(S: ArrayLike) -> Array:
     a few eps (1 + ‖ω‖) (1 + ‖v‖). There is no singular set; ω = 0 gives the translation by v
     exactly.
     Source: BK 2.6.
-
-    Parameters
-    ----------
-    S : array_like, shape (..., 6)
-        Twists (ω, v), for one unit of time: ω in rad, v in m.
 
     Examples
     --------
@@ -254,19 +244,11 @@ def adjoint_se3(A: ArrayLike) -> Array:
     return Ad
 
 
+@described_by(__doc__)
 def twist_from_rates(A: ArrayLike, w: ArrayLike, d_dot: ArrayLike) -> Array:
     """Return the twist (ω, v) of a body from ω in the body frame and ḋ in the fixed frame.
 
     Source: BK 6.3, which states end velocities by ω and ḋ.
-
-    Parameters
-    ----------
-    A : array_like, shape (..., 4, 4)
-        The poses of the body.
-    w : array_like, shape (..., 3)
-        Angular velocities in the body frame.
-    d_dot : array_like, shape (..., 3)
-        Velocities of the origin in the fixed frame.
 
     Returns
     -------

@@ -4,7 +4,9 @@ Parameters
 ----------
 w : array_like, shape (..., 3)
     Rotation vectors, in rad.
-R : array_like, shape (..., 3, 3)
+W : array_like, shape (..., 3, 3)
+    Matrices, of which only the skew-symmetric part matters.
+R, S : array_like, shape (..., 3, 3)
     Rotation matrices.
 """
 
@@ -61,16 +63,11 @@ def hat_so3(w: ArrayLike) -> Array:
     return hat(as_finite("w", w, 3))
 
 
-@described_by(returns="(..., 3)")
+@described_by(__doc__, returns="(..., 3)")
 def vee_so3(W: ArrayLike) -> Array:
     """Return the vector of the skew-symmetric part (W − Wᵀ)/2: the inverse of `hat_so3`.
 
     Source: BK 2.1.
-
-    Parameters
-    ----------
-    W : array_like, shape (..., 3, 3)
-        Matrices, of which only the skew-symmetric part matters.
 
     Examples
     --------
@@ -121,15 +118,11 @@ def log(R: Array) -> Array:
     return rotation_vector_of(quaternion_of(R))
 
 
+@described_by(__doc__)
 def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     """Return the angle of the rotation from R to S: the geodesic distance ‖log_so3(Rᵀ S)‖.
 
     Source: BK 6.1.
-
-    Parameters
-    ----------
-    R, S : array_like, shape (..., 3, 3)
-        Rotation matrices.
 
     Returns
     -------

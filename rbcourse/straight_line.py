@@ -1,4 +1,14 @@
-"""The straight line between two rotations: the timings θ and f of its projection on SO(3)."""
+"""The straight line between two rotations: the timings θ and f of its projection on SO(3).
+
+Parameters
+----------
+t : array_like, shape (...)
+    The positions on the line, which may be any real numbers.
+angle : array_like, shape (...)
+    The angle ‖ω₀‖ of the rotation R2 = exp(ω̂₀) at the end of the line, in [0, π].
+order : {0, 1, 2, 3}, optional
+    The order of the derivative with respect to t.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +24,12 @@ __all__ = ["f", "line_singular_value", "theta"]
 _PI_REST = 1.2246467991473532e-16  # π − np.pi
 
 
+@described_by(__doc__)
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     """Return s(t) for the line (1 − t) I + t R2, whose singular values are 1, s(t), s(t).
 
     s vanishes only for the angle π at t = 1/2, where the nearest rotation is not unique.
     Source: BK (17).
-
-    Parameters
-    ----------
-    t, angle : array_like, shape (...)
-        The positions on the line, which may be any real numbers, and the angle ‖ω₀‖ of R2 in [0,
-        π].
 
     Returns
     -------
@@ -39,6 +44,7 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     return singular_value(*_where_and_angle(as_finite("t", t), angle))
 
 
+@described_by(__doc__)
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return θ(t), or a derivative, where exp(ω̂₀ θ(t)) is nearest to (1 − t) I + t exp(ω̂₀).
 
@@ -47,15 +53,6 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     the finite slope 1e16.
     Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², with s from BK
     (17); the paper prints s instead of s².
-
-    Parameters
-    ----------
-    t : array_like, shape (...)
-        The positions on the line, which may be any real numbers.
-    angle : array_like, shape (...)
-        The angle ‖ω₀‖ in [0, π].
-    order : {0, 1, 2, 3}, optional
-        The order of the derivative with respect to t.
 
     Returns
     -------
