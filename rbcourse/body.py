@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_inertia, as_positive, as_single, check_all, first_index
-from rbcourse._numerics import EPS, Array, scaled
+from rbcourse._numerics import EPS, Array, cross, scaled
 
 __all__ = ["Body"]
 
@@ -164,6 +164,22 @@ def _listed(numbers: Iterable[float]) -> str:
 
 
 Body._default = Body(2 * np.eye(3))
+
+
+def of_point(r: Array, V: Array, A: Array | None = None) -> Array:
+    """Return the velocity v + w × r of a body's point r or, given A, its acceleration.
+
+    V = (w, v) is the twist of the body, and A = (w', a) its acceleration. The acceleration of the
+    point is a + w' × r + w × (w × r). All vectors are in the body frame.
+    """
+    moving = V if A is None else A
+    if not r.any():
+        return moving[..., 3:]
+    point = moving[..., 3:] + cross(moving[..., :3], r)
+    if A is None:
+        return point
+    w = V[..., :3]
+    return point + cross(w, cross(w, r))
 
 
 def weight_of(name: str, G: Array) -> Array:

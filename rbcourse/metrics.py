@@ -33,7 +33,9 @@ __all__ = [
 ]
 
 METRIC_SO3 = 2 * np.eye(3)
-"""The matrix G of the metric that the trace induces on SO(3), shape (3, 3) (BK (12))."""
+"""The matrix G of the metric that the trace induces on SO(3), shape (3, 3) (BK (12)).
+
+The paper prints δ_ij in place of 2 δ_ij in its section 3.1."""
 METRIC_SE3 = np.diag([2.0, 2, 2, 1, 1, 1])
 """The matrix G of the metric that the trace induces on SE(3), shape (6, 6) (BK (14))."""
 METRIC_SO3.flags.writeable = METRIC_SE3.flags.writeable = False

@@ -47,8 +47,11 @@ __all__ = [
     "canonical_quaternion",
     "continuous_quaternions",
     "is_unit_quaternion",
+    "matrix_from_quaternion",
+    "matrix_from_zyx",
     "project_quaternion",
     "quaternion_conjugate",
+    "quaternion_from_matrix",
     "quaternion_from_rotation_vector",
     "quaternion_from_zyx",
     "quaternion_multiply",
@@ -56,6 +59,7 @@ __all__ = [
     "rotation_vector_from_quaternion",
     "slerp",
     "slerp_long",
+    "zyx_from_matrix",
     "zyx_from_quaternion",
 ]
 

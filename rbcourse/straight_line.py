@@ -34,7 +34,8 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     Returns
     -------
     ndarray, shape (...)
-        √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2)), with a relative error of a few eps.
+        √(1 − 2 t (1 − t) (1 − cos ‖ω₀‖)), computed as √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2))
+        with a relative error of a few eps.
 
     Examples
     --------
@@ -47,6 +48,10 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
 @described_by(__doc__)
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return θ(t), or a derivative, where exp(ω̂₀ θ(t)) is nearest to (1 − t) I + t exp(ω̂₀).
+
+    With a = ‖ω₀‖, θ(t) = atan2(t sin a, 1 − t + t cos a)/a. (The paper prints the arguments of
+    atan2 in the other order, and f(t) in place of t.) The form in the code is measured from the
+    middle, where θ = 1/2; it loses no digits near a = π.
 
     For the angle 0, the limit θ(t) = t is returned. The angle π is singular: θ is 0 before t = 1/2,
     1/2 at this time and 1 after it. For `numpy.pi`, which is less than π by 1.2e-16, the jump has
@@ -78,8 +83,9 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return the position f(t) for which the projection has constant speed, or a derivative.
 
-    The function f is the inverse of `theta`: theta(f(t)) = t. The rounding of f changes theta(f(t))
-    by up to eps · 2 tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.
+    The function f is the inverse of `theta`: theta(f(t)) = t, that is, a θ(f(t)) = a t with a =
+    ‖ω₀‖, where the paper prints t on the right. The rounding of f changes theta(f(t)) by up to eps
+    · 2 tan(‖ω₀‖/2)/‖ω₀‖, that is, eps times the greatest slope of θ.
 
     For the angle 0, the limit f(t) = t is returned. The angle π is singular: f is 0 at t = 0, 1 at
     t = 1, and 1/2 at all times in between. For `numpy.pi`, which is less than π by 1.2e-16, f' is
@@ -128,7 +134,7 @@ def singular_value(t: Array, angle: Array) -> Array:
 
 
 def theta_at(t: Array, angle: Array) -> Array:
-    tiny = angle < 1e-290
+    tiny = angle < 1e-290  # the quotient below would lose digits in subnormal numbers
     turn = np.where(tiny, 1.0, angle)
     return np.where(tiny, t, 0.5 + np.arctan((2 * t - 1) * np.tan(turn / 2)) / turn)[()]
 

@@ -372,7 +372,7 @@ def test_bad_arguments_are_refused():
         (partial(torque, body=2), motion, "^body: a Body is wanted, such as Body"),
         (acceleration, None, "^curve: a Curve is wanted, got None"),
         (jerk, None, "^curve: a Curve is wanted, got None"),
-        (jerk, motion, "^curve: a curve on SO.3. is wanted, got <Rigid"),
+        (jerk, motion, "^curve: a curve on SO.3., as of poses.* is wanted, got <Rigid"),
         *((partial(jerk, rtol=x), line, "^rtol") for x in (0, 1e-13, 0.2, np.nan, [1e-6] * 2)),
     ):
         with pytest.raises(ValueError, match=message):

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_finite, as_single
 from rbcourse._numerics import Array, blocks, cross, matvec, reported
-from rbcourse.body import Body
+from rbcourse.body import Body, of_point
 from rbcourse.curves.chain import Chain, evaluate_legs
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.ends import as_body
@@ -118,11 +118,10 @@ class Limit:
             return w, w_rate, zero
         if self.name == "torque":
             return w @ G, w_rate @ G + cross(w, w @ G), zero
-        v = V[..., 3:] + cross(w, r)
+        v = of_point(r, V)
         if self.name == "speed":
             return zero, v, zero
-        turning = cross(w_rate, r)
-        v_rate = A[..., 3:] + turning + cross(w, cross(w, r))
+        v_rate = of_point(r, V, A)
         if self.name == "acceleration":
             return v, v_rate, zero
         weight = m * matvec(R.mT, self.gravity)

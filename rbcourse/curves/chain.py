@@ -312,6 +312,11 @@ class Chain(Curve):
         inside = self.legs.breakpoints * T[:, None]
         return np.unique((np.append(0.0, np.cumsum(T[:-1]))[:, None] + inside) / np.sum(T))
 
+    @property
+    def margin(self) -> Array:
+        """The least margin of the legs."""
+        return np.asarray(self.legs.margin.min())
+
     def _what(self) -> str:
         return f"Chain of {self.legs.count} legs, {self.legs._what()},"
 

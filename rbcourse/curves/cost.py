@@ -13,7 +13,7 @@ from rbcourse._chebyshev import grid
 from rbcourse._checks import as_single, check_broadcast
 from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array, blocks
-from rbcourse.body import Body
+from rbcourse.body import Body, of_point
 from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve, SingularTime, which_curve
 from rbcourse.curves.ends import as_body
@@ -225,12 +225,9 @@ def _rotation_cost(
 
 def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Array:
     """Return ‖d_c''‖² for the point r of the body."""
-    a = curve.values(t, 2)
-    moved = a[..., 3:]
-    if r.any():
-        w = curve.values(t, 1)[..., :3]
-        moved = moved + np.cross(a[..., :3], r) + np.cross(w, np.cross(w, r))
-    return np.sum(moved**2, axis=-1)
+    A = curve.values(t, 2)
+    V = curve.values(t, 1) if r.any() else A  # the velocity does not matter at the origin
+    return np.sum(of_point(r, V, A) ** 2, axis=-1)
 
 
 def integral(name: str, curve: Curve, density: Density, rtol: float) -> Array:

@@ -16,7 +16,7 @@ from rbcourse._hermite import hermite
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse._quaternions import Jet, angular_velocity, multiply, rotation
 from rbcourse._valid import as_rotations_or_poses
-from rbcourse.body import Body
+from rbcourse.body import Body, of_point
 from rbcourse.curves._html import curve_html
 
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
@@ -549,16 +549,14 @@ class Moved(Curve):
 def moved_rates(X: Array, *rates: Array) -> list[Array]:
     """Return velocities and accelerations (as ``c(t, 1)`` and ``c(t, 2)``) relative to the frame X.
 
-    The point r of the body, the new origin, has the velocity v + w × r and the acceleration
-    a + w' × r + w × (w × r).
+    The new origin is a point of the body.
     """
-    R, found = X[:3, :3], [x.copy() for x in rates]
-    if rates and X.shape == (4, 4):
-        r, w = X[:3, 3], rates[0][..., :3]
-        found[0][..., 3:] += cross(w, r)
-        if len(rates) > 1:
-            found[1][..., 3:] += cross(rates[1][..., :3], r) + cross(w, cross(w, r))
-    return [x @ (R if x.shape[-1] == 3 else np.kron(np.eye(2), R)) for x in found]
+    R = X[:3, :3]
+    found = [rate[..., :3] @ R for rate in rates]
+    if X.shape == (3, 3):
+        return found
+    moving = [of_point(X[:3, 3], *rates[:k]) @ R for k in range(1, len(rates) + 1)]
+    return [np.concatenate(pair, axis=-1) for pair in zip(found, moving, strict=True)]
 
 
 def other_way(turn: Array) -> Array:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_array, as_duration, check_all, check_broadcast
-from rbcourse._numerics import Array, cross, matvec
+from rbcourse._numerics import Array, matvec
 from rbcourse._valid import as_rotations_or_poses
-from rbcourse.body import Body
+from rbcourse.body import Body, of_point
 
 Rate: TypeAlias = ArrayLike | None
 """A velocity or an acceleration at one end of a curve; None is 0."""
@@ -87,25 +87,22 @@ def between(
     )
     T = np.broadcast_to(T, batch)
     R0, R1 = (np.broadcast_to(A[..., :3, :3], (*batch, 3, 3)) for A in (start, goal))
-    scaled = [
-        np.broadcast_to(T[..., None] ** (1 + i // 2) * rate, (*batch, size))
-        for i, rate in enumerate(rates.values())
-    ]
-    turning = [rate[..., :3] for rate in scaled]
-    ends = Ends(R0, R1, *turning[:2])
-    if size == 3:
-        return Given(ends, T, body, bends=tuple(turning[2:]))
-    positions = (
-        np.broadcast_to(A[..., :3, 3] + matvec(A[..., :3, :3], body.centre), (*batch, 3))
-        for A in (start, goal)
+    V0, V1, *bends = (
+        np.broadcast_to(T[..., None] ** order * rate, (*batch, size))
+        for order, rate in zip((1, 1, 2, 2), rates.values(), strict=False)
     )
-    moving = at_centre(body.centre, scaled[::2]), at_centre(body.centre, scaled[1::2])
-    path = [
-        matvec(R, rate)
-        for pair in zip(*moving, strict=True)
-        for R, rate in zip((R0, R1), pair, strict=True)
-    ]
-    return Given(ends, T, body, (*positions, *path), tuple(turning[2:]))
+    ends = Ends(R0, R1, V0[..., :3], V1[..., :3])
+    turning = tuple(A[..., :3] for A in bends)
+    if size == 3:
+        return Given(ends, T, body, bends=turning)
+    r = body.centre
+    d0, d1 = (np.broadcast_to(A[..., :3, 3], (*batch, 3)) for A in (start, goal))
+    path = [d0 + matvec(R0, r), d1 + matvec(R1, r)]
+    path += [matvec(R0, of_point(r, V0)), matvec(R1, of_point(r, V1))]
+    if bends:
+        A0, A1 = bends
+        path += [matvec(R0, of_point(r, V0, A0)), matvec(R1, of_point(r, V1, A1))]
+    return Given(ends, T, body, tuple(path), turning)
 
 
 def on_rotations(given: Given, what: str) -> Given:
@@ -123,20 +120,6 @@ def as_body(body: Body | None, default: Body | None = None) -> Body:
     if not isinstance(body, Body):
         raise ValueError(f"body: a Body is wanted, such as Body(inertia), got {body!r}")
     return body
-
-
-def at_centre(r: Array, rates: list[Array]) -> list[Array]:
-    """Return the velocity (and acceleration) of the point r of a body, in the body frame.
-
-    `rates` contains the twist (w, v) of the body and, if wanted, its acceleration (w', a).
-    """
-    if not r.any():
-        return [rate[..., 3:] for rate in rates]
-    w = rates[0][..., :3]
-    points = [rate[..., 3:] + np.cross(rate[..., :3], r) for rate in rates]
-    if len(points) > 1:
-        points[1] = points[1] + cross(w, np.cross(w, r))
-    return points
 
 
 def _as_rate(name: str, value: Rate, size: int) -> Array:

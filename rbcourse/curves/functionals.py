@@ -47,8 +47,9 @@ scale, unit : float or ndarray, shape (N,)
 class BallAcceleration:
     """The functional 2 ∫ ‖w'‖² dt: the squared covariant acceleration of a ball (G = 2 I).
 
-    Here u = w' and p = w''. The optimum has R w'' = c.
-    Source: BK (18), BK (19).
+    Here u = w' and p = w''. The optimum has R w'' = c, a constant vector in the fixed frame. By
+    (19), the components w'' + w × w' = b are constant, too (20), so that c = R (b − w × w').
+    Source: BK (18), BK (19), BK (20).
     """
 
     name, ends, scale, unit = "acceleration", 2, 2.0, 1.0

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import as_array, check_all
 from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import Array, matvec
+from rbcourse.body import of_point
 from rbcourse.curves.curve import Curve
-from rbcourse.curves.ends import Given, at_centre
+from rbcourse.curves.ends import Given
 
 Position = Callable[..., ArrayLike]
 
@@ -76,7 +77,8 @@ class RigidMotion(Curve):
 def _of_rotation_and_path(r: Array, R: Array, rates: list[Array], path: Array, order: int) -> Array:
     """Return the pose, velocity or acceleration of a motion whose point r follows a path.
 
-    `rates` contains w, w' up to the given order, and `path` the derivative of this order.
+    `rates` contains w, w' up to the given order (of which only the last is needed if r is 0), and
+    `path` the derivative of this order.
     """
     if order == 0:
         pose = np.zeros((*R.shape[:-2], 4, 4))
@@ -86,7 +88,7 @@ def _of_rotation_and_path(r: Array, R: Array, rates: list[Array], path: Array, o
     v = matvec(R.mT, path)
     if r.any():  # the motion of the point relative to the origin
         still = [np.concatenate([rate, np.zeros_like(rate)], axis=-1) for rate in rates]
-        v = v - at_centre(r, still)[-1]
+        v = v - of_point(r, *still)
     return np.concatenate([np.broadcast_to(rates[-1], v.shape), v], axis=-1)
 
 
@@ -129,6 +131,11 @@ class Joined(Curve):
             raise ValueError(f"{name}: shape {shape} is wanted, got {found.shape}")
         check_all(np.isfinite(found), name, found, "a finite number")
         return found.reshape(*t.shape, 3)
+
+    @property
+    def margin(self) -> Array:
+        """The margin of the rotation."""
+        return self.rotation.margin
 
     @property
     def breakpoints(self) -> Array:

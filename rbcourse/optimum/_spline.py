@@ -153,11 +153,19 @@ def _about_one_axis(R: Array) -> bool:
 
 
 def _off_the_axis(R: Array) -> Array:
-    """Return a curve that leaves its axis on each leg, to the sides `BEND` and −`BEND` in turn."""
+    """Return a curve that leaves its axis on each leg, to one side and to the other in turn.
+
+    The side is the part of `BEND` across the axis or, if this is small, another direction.
+    """
+    turns = log(R[0, 0].T @ R).reshape(-1, 3)
+    _, _, (axis, other, _) = np.linalg.svd(turns, full_matrices=False)
+    side = BEND - (BEND @ axis) * axis
+    if np.linalg.norm(side) < 0.5:
+        side = other
     t = grid(R.shape[1]).t[:, None]
     share = 16 * t**2 * (1 - t) ** 2
     signs = (-1.0) ** np.arange(len(R))
-    sides = signs[:, None, None] * BEND
+    sides = signs[:, None, None] * side
     return R @ exp_so3(share * sides)
 
 
