@@ -77,18 +77,13 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     return Posture(joints, frames)
 
 
-@described_by(arm_forward_kinematics)
+@described_by(arm_forward_kinematics, returns="(..., 2, n)")
 def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the matrix that maps joint velocities to the velocity of the tip in the world frame.
 
-    Singular set: all links lie on one line, stretched or folded. The rank is then 1.
+    Singular set: all links lie on one line, stretched or folded. The rank is then 1. The matrix is
+    in m/rad. Column k is the vector from joint k to the tip, turned to the left by 90°.
     Source: RR 4.
-
-    Returns
-    -------
-    ndarray, shape (..., 2, n)
-        The matrix in m/rad. Column k is the vector from joint k to the tip, turned to the left by
-        90°.
 
     Examples
     --------
@@ -101,11 +96,14 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     return np.stack([-reach[..., 1], reach[..., 0]], axis=-2)
 
 
+@described_by(returns="(..., 2, 2)")
 def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the two sets of joint angles that bring the tip of a two-link arm to a position.
 
     Singular set: the links lie on one line. Both solutions are then the same up to full turns. If
     equal links are folded, the tip is at the base for any first angle; one such angle is returned.
+    The angles are in [−π, π], one row for each solution. The first solution has an elbow angle in
+    [0, π], and the second is its mirror image.
     Source: RR 4.
 
     Parameters
@@ -114,12 +112,6 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
         The position of the tip in the world frame. A position out of reach raises ValueError.
     lengths : array_like, shape (2,), optional
         Lengths of the links, above 0.
-
-    Returns
-    -------
-    ndarray, shape (..., 2, 2)
-        Angles in [−π, π], one row for each solution. The first solution has an elbow angle in [0,
-        π], and the second is its mirror image.
 
     Examples
     --------
@@ -145,21 +137,17 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     return np.stack([shoulder - 2 * np.pi * turns, elbow], axis=-1)
 
 
-@described_by(interpolate_planar)
+@described_by(interpolate_planar, returns="(steps + 1, ..., n)")
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
     """Interpolate joint angles linearly in equal steps, without removing full turns.
 
+    The first and the last row are exact.
     Source: RR 4.1, RR (20), RR (21), with errata 19.
 
     Parameters
     ----------
     start, goal : array_like, shape (..., n)
         Joint angles at both ends, in rad.
-
-    Returns
-    -------
-    ndarray, shape (steps + 1, ..., n)
-        The first and the last row are exact.
 
     Examples
     --------

@@ -28,9 +28,11 @@ __all__ = [
 ]
 
 
+@described_by(returns="(m, m, m)")
 def structure_constants(basis: ArrayLike) -> Array:
     """Return C with [L_i, L_j] = C[k, i, j] L_k, summed over k, for a basis of a Lie algebra.
 
+    The constants are antisymmetric in i and j; for ``BASIS_SO3``, C[k, i, j] = ε_ijk.
     Source: BK 2.4, BK (2), BK (3).
 
     Parameters
@@ -39,11 +41,6 @@ def structure_constants(basis: ArrayLike) -> Array:
         The basis L_1 … L_m, such as ``BASIS_SO3`` or ``BASIS_SE3``. The matrices must be linearly
         independent; the tolerance is one part in a million. Up to rounding, their commutators must
         be combinations of the basis matrices.
-
-    Returns
-    -------
-    ndarray, shape (m, m, m)
-        The constants are antisymmetric in i and j; for ``BASIS_SO3``, C[k, i, j] = ε_ijk.
 
     Examples
     --------

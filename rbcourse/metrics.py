@@ -200,21 +200,18 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     return A @ (hat_so3(x) if size == 3 else hat_se3(x))
 
 
+@described_by(returns="(..., 3) or (..., 6)")
 def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     """Return the components x = vee(A⁻¹ X) of tangent vectors X at A, using Rᵀ for R⁻¹.
 
-    The part of X that is normal to the tangent space is dropped.
+    The part of X that is normal to the tangent space is dropped. The results are angular velocities
+    or twists; the components of A' are the velocity of BK (1).
     Source: BK 2.2, BK (1), BK (5).
 
     Parameters
     ----------
     A, X : array_like, shape (..., 3, 3) or (..., 4, 4)
         Rotations or poses A, and tangent vectors X at A.
-
-    Returns
-    -------
-    ndarray, shape (..., 3) or (..., 6)
-        Angular velocities or twists; the components of A' are the velocity of BK (1).
 
     Examples
     --------
@@ -228,9 +225,11 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     return _components(A, X)
 
 
+@described_by(returns="(..., 3, 3)")
 def inertia_from_weight(W: ArrayLike) -> Array:
     """Return tr(W) I − W, the matrix of the metric that tr(XᵀY W) induces on SO(3).
 
+    For a body, this is its inertia about the origin.
     Source: BK 3, for the metrics that the paper leaves to a later publication.
 
     Parameters
@@ -238,11 +237,6 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     W : array_like, shape (..., 3, 3)
         Symmetric matrices. The W of a body is ∫ p pᵀ dm over its points p in the body frame, in kg
         m².
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        For a body, this is its inertia about the origin.
 
     Examples
     --------

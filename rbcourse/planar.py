@@ -49,16 +49,12 @@ Plan: TypeAlias = Iterable[tuple[ArrayLike, float]]
 Commands: TypeAlias = list[tuple[Array, float]]
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3, 3)")
 def matrix_from_planar(pose: ArrayLike) -> Array:
     """Return the matrices [[cos θ, −sin θ, x], [sin θ, cos θ, y], [0, 0, 1]] of planar poses.
 
+    The matrices map coordinates in the body frame to coordinates in the world frame.
     Source: RR 3.1.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        The matrices map coordinates in the body frame to coordinates in the world frame.
 
     Examples
     --------
@@ -97,16 +93,12 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     return np.concatenate([A[..., :2, 2], theta[..., None]], axis=-1)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3)")
 def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     """Convert the pose `step` from the body frame of `pose` to the world frame.
 
+    The matrix of the result is the product of the two matrices, and the angles add up.
     Source: RR 3.2.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        The matrix of the result is the product of the two matrices, and the angles add up.
 
     Examples
     --------
@@ -135,19 +127,15 @@ def inverse_planar(pose: ArrayLike) -> Array:
     return np.concatenate([-_rotated(back, pose[..., :2]), back[..., None]], axis=-1)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3)")
 def exp_planar(S: ArrayLike) -> Array:
     """Return the pose to which the constant body twist S leads from (0, 0, 0) in unit time.
 
     The matrix of this pose is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]].
-    There is no singular set; omega = 0 gives the translation exactly.
+    There is no singular set; omega = 0 gives the translation exactly. In the pose (x, y, omega),
+    the point (x, y) is the end of an arc through the angle omega. The vector (x, y) is (vx, vy),
+    turned by omega/2 and multiplied by sin(omega/2) / (omega/2).
     Source: RR 3.2.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Poses (x, y, omega). The point (x, y) is the end of an arc through the angle omega. The
-        vector (x, y) is (vx, vy), turned by omega/2 and multiplied by sin(omega/2) / (omega/2).
 
     Examples
     --------
@@ -160,18 +148,14 @@ def exp_planar(S: ArrayLike) -> Array:
     return np.concatenate([chord, S[..., 2:]], axis=-1)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3)")
 def log_planar(pose: ArrayLike) -> Array:
     """Return the body twist with −π ≤ omega ≤ π that leads from (0, 0, 0) to a pose in unit time.
 
     Singular set: half-turns, to which two twists lead. theta = π gives omega = π, and −π gives −π.
-    If full turns are added to these angles, rounding decides the sign.
+    If full turns are added to these angles, rounding decides the sign. `exp_planar` maps the twists
+    (vx, vy, omega) to the poses, up to full turns.
     Source: RR 3.1.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Twists (vx, vy, omega); `exp_planar` maps them to the poses, up to full turns.
 
     Examples
     --------
@@ -184,16 +168,16 @@ def log_planar(pose: ArrayLike) -> Array:
     return np.concatenate([chord / sinc(turn / 2), turn], axis=-1)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(steps + 1, ..., 3)")
 def interpolate_planar(
     start: ArrayLike, goal: ArrayLike, steps: int = 10, *, shortest: bool = False
 ) -> Array:
     """Return poses (x, y, theta) interpolated linearly, in equal steps, from start to goal.
 
-    The path depends on which point of the body has the position (x, y).
-    Singular set of `shortest`: angles that differ by half a turn. If the given angles differ by π
-    or −π, the turn is this difference. If the angles also differ by full turns, rounding decides
-    the sign of the turn.
+    The path depends on which point of the body has the position (x, y). Singular set of `shortest`:
+    angles that differ by half a turn. If the given angles differ by π or −π, the turn is this
+    difference. If the angles also differ by full turns, rounding decides the sign of the turn. The
+    first and the last row are exact.
     Source: RR 3.1, RR (14), RR (15), RR (16).
 
     Parameters
@@ -201,11 +185,6 @@ def interpolate_planar(
     shortest : bool, optional
         Whether to turn by at most π (up to rounding). The last theta may then differ by full turns
         from the theta of `goal`. By default, theta changes from its given start to its given goal.
-
-    Returns
-    -------
-    ndarray, shape (steps + 1, ..., 3)
-        The first and the last row are exact.
 
     Examples
     --------
@@ -223,10 +202,11 @@ def interpolate_planar(
     return interpolate(start, goal, steps)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(commands + 1, ..., 3)")
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
     """Return the poses, with full turns, at the start and after each command of a plan.
 
+    The path has a pose only at the end of each command. To see poses in between, divide a command.
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Parameters
@@ -237,12 +217,6 @@ def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> A
         The frame of vx and vy. With "world", a command adds its velocity times its duration. With
         "body", a command is a constant twist, which moves the body along an arc or a line
         (`exp_planar`).
-
-    Returns
-    -------
-    ndarray, shape (commands + 1, ..., 3)
-        The path has a pose only at the end of each command. To see poses in between, divide a
-        command.
 
     Examples
     --------

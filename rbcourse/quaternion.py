@@ -99,16 +99,12 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     return quaternion_of(as_rotations("R", R))
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 4)")
 def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     """Return the quaternion (cos(a/2), sin(a/2) w/a) of the rotation by a = ‖w‖ about w.
 
+    The quaternion is (−1, 0, 0, 0) for one full turn, and (1, 0, 0, 0) for two full turns.
     Source: BK 2.5, RR 2.2.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        The quaternion is (−1, 0, 0, 0) for one full turn, and (1, 0, 0, 0) for two full turns.
 
     Examples
     --------
@@ -155,16 +151,12 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
     return _turn_about(2, alpha) @ _turn_about(1, beta) @ _turn_about(0, gamma)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3)")
 def zyx_from_matrix(R: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), as `zyx_from_quaternion` does.
 
+    The angles reproduce R to a few eps (in gimbal lock, to 40 eps).
     Source: RR 2.1, RR (7), RR (8).
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        The angles reproduce R to a few eps (in gimbal lock, to 40 eps).
 
     Examples
     --------
@@ -174,16 +166,11 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     return zyx_from_quaternion(quaternion_from_matrix(R))
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 4)")
 def quaternion_from_zyx(angles: ArrayLike) -> Array:
     """Return q_z(α) q_y(β) q_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
     Source: RR 2.2, where α turns about x and γ about z.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        Unit quaternions.
 
     Examples
     --------
@@ -200,21 +187,16 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
     return np.stack([w, x, y, z], axis=-1)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3)")
 def zyx_from_quaternion(q: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
 
     Singular set: gimbal lock, where β differs from ±π/2 by less than 16 eps. Then only α − γ (for β
     = −π/2, only α + γ) is determined, and γ = 0 is returned. Near gimbal lock, α and γ are accurate
-    to eps divided by the distance of β from ±π/2, but α ∓ γ is accurate to eps.
+    to eps divided by the distance of β from ±π/2, but α ∓ γ is accurate to eps. α and γ are in (−π,
+    π], and β is in [−π/2, π/2]. The angles reproduce q to a few eps (in gimbal lock, to 20 eps).
     Source: RR 2.2; E. Bernardes and S. Viollet, Quaternion to Euler angles conversion, PLoS ONE
     17(11), 2022.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        α and γ are in (−π, π], and β is in [−π/2, π/2]. The angles reproduce q to a few eps (in
-        gimbal lock, to 20 eps).
 
     Examples
     --------
@@ -350,22 +332,18 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     return canonical(as_finite("q", q, 4))
 
 
+@described_by(returns="(N, ..., 4) or (4,)")
 def continuous_quaternions(q: ArrayLike) -> Array:
     """Choose the signs of quaternions along a path so that each is near to the previous one.
 
     Unlike the quaternions of `quaternion_from_matrix`, the result does not jump where w passes
     through 0. Singular set: successive rotations are a half-turn apart. The sign is then changed if
-    the previous sign was changed.
+    the previous sign was changed. The first quaternion keeps its sign.
 
     Parameters
     ----------
     q : array_like, shape (N, ..., 4) or (4,)
         Quaternions of any norm; the first axis is time. A single quaternion is returned unchanged.
-
-    Returns
-    -------
-    ndarray, shape (N, ..., 4) or (4,)
-        The quaternions ± q; the first one keeps its sign.
 
     Examples
     --------

@@ -75,9 +75,12 @@ def arvo_rotation(x: ArrayLike) -> Array:
     return -M @ B
 
 
+@described_by(returns="(..., 4)")
 def shoemake_quaternion(x: ArrayLike) -> Array:
     """Return Shoemake's quaternion for three numbers; uniform numbers give uniform rotations.
 
+    The quaternion is (√s cos θ₂, √(1−s) sin θ₁, √(1−s) cos θ₁, √s sin θ₂), with θ₁ = 2π x₁ and θ₂ =
+    2π x₂.
     Source: RR 2.2, RR (13); J. J. Kuffner, Effective sampling and distance metrics for 3D rigid
     body path planning, ICRA 2004; K. Shoemake, Uniform random rotations, Graphics Gems III, 1992.
 
@@ -85,11 +88,6 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
     ----------
     x : array_like, shape (..., 3)
         s, x₁, x₂ in [0, 1].
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        (√s cos θ₂, √(1−s) sin θ₁, √(1−s) cos θ₁, √s sin θ₂), with θ₁ = 2π x₁ and θ₂ = 2π x₂.
 
     Examples
     --------
@@ -103,17 +101,12 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
     return np.stack([w, np.sin(theta1) * sigma1, np.cos(theta1) * sigma1, z], axis=-1)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="size + (3, 3)")
 def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random rotation matrices.
 
+    On every processor, the result is ``arvo_rotation(rng.random(size + (3,)))`` up to a few eps.
     Source: RR 2.1, RR (9), RR (10), RR (11).
-
-    Returns
-    -------
-    ndarray, shape size + (3, 3)
-        On every processor, the result is ``arvo_rotation(rng.random(size + (3,)))`` up to a few
-        eps.
 
     Examples
     --------
@@ -124,17 +117,13 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     return _in_blocks(_arvo, (3, 3), size, rng)
 
 
-@described_by(sample_rotation)
+@described_by(sample_rotation, returns="size + (4,)")
 def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random unit quaternions; q and −q are equally likely.
 
+    On every processor, the result is ``shoemake_quaternion(rng.random(size + (3,)))`` up to a few
+    eps.
     Source: RR 2.2, RR (13).
-
-    Returns
-    -------
-    ndarray, shape size + (4,)
-        On every processor, the result is ``shoemake_quaternion(rng.random(size + (3,)))`` up to a
-        few eps.
 
     Examples
     --------

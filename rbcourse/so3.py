@@ -118,16 +118,12 @@ def log(R: Array) -> Array:
     return rotation_vector_of(quaternion_of(R))
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(...)")
 def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     """Return the angle of the rotation from R to S: the geodesic distance ‖log_so3(Rᵀ S)‖.
 
+    The angles are in [0, π], accurate to a few eps.
     Source: BK 6.1.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Angles in [0, π], accurate to a few eps.
 
     Examples
     --------
@@ -139,18 +135,14 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     return np.linalg.norm(log(np.swapaxes(R, -1, -2) @ S), axis=-1)
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3, 3)")
 def right_jacobian_so3(w: ArrayLike) -> Array:
     """Return the matrix J for which J w' is the body angular velocity along exp_so3(w(t)).
 
     The transpose of J is the left Jacobian, which gives the angular velocity in the fixed frame.
-    Singular set: J is smooth, but has rank 1 if ‖w‖ = 2π, 4π, …
+    Singular set: J is smooth, but has rank 1 if ‖w‖ = 2π, 4π, … J is I − (1 − cos a)/a n̂ + (1 −
+    sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps.
     Source: BK 2.5.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        I − (1 − cos a)/a n̂ + (1 − sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps.
 
     Examples
     --------
@@ -161,18 +153,14 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     return np.eye(3) - np.sin(angle / 2) * sinc(angle / 2) * N + (1 - sinc(angle)) * N @ N
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(..., 3, 3)")
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     """Return the inverse of `right_jacobian_so3`, which maps body angular velocities to w'.
 
     Singular set: ‖w‖ = 2π, 4π, …. J then has no inverse, and the result is finite and huge. Near
-    this set, the entries are inversely proportional to the distance from it.
+    this set, the entries are inversely proportional to the distance from it. The result is I + ŵ/2
+    + (1 − (a/2) cot(a/2)) n̂² with a = ‖w‖ and n = w/a.
     Source: BK 2.5.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        I + ŵ/2 + (1 − (a/2) cot(a/2)) n̂² with a = ‖w‖ and n = w/a.
 
     Examples
     --------

@@ -24,18 +24,14 @@ __all__ = ["f", "line_singular_value", "theta"]
 _PI_REST = 1.2246467991473532e-16  # π − np.pi
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(...)")
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     """Return s(t) for the line (1 − t) I + t R2, whose singular values are 1, s(t), s(t).
 
-    s vanishes only for the angle π at t = 1/2, where the nearest rotation is not unique.
+    s vanishes only for the angle π at t = 1/2, where the nearest rotation is not unique. s(t) is
+    √(1 − 2 t (1 − t) (1 − cos ‖ω₀‖)), computed as √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2)) with a
+    relative error of a few eps.
     Source: BK (17).
-
-    Returns
-    -------
-    ndarray, shape (...)
-        √(1 − 2 t (1 − t) (1 − cos ‖ω₀‖)), computed as √(cos²(‖ω₀‖/2) + (2t − 1)² sin²(‖ω₀‖/2))
-        with a relative error of a few eps.
 
     Examples
     --------
@@ -45,7 +41,7 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     return singular_value(*_where_and_angle(as_finite("t", t), angle))
 
 
-@described_by(__doc__)
+@described_by(__doc__, returns="(...)")
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return θ(t), or a derivative, where exp(ω̂₀ θ(t)) is nearest to (1 − t) I + t exp(ω̂₀).
 
@@ -55,15 +51,10 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
     For the angle 0, the limit θ(t) = t is returned. The angle π is singular: θ is 0 before t = 1/2,
     1/2 at this time and 1 after it. For `numpy.pi`, which is less than π by 1.2e-16, the jump has
-    the finite slope 1e16.
+    the finite slope 1e16. θ is accurate to a few eps times
+    max(1, abs(θ)). Derivatives have a relative error of a few eps.
     Source: BK (16), BK Prop. 6, BK Cor. 1. The derivative is (sin ‖ω₀‖/‖ω₀‖)/s², with s from BK
     (17); the paper prints s instead of s².
-
-    Returns
-    -------
-    ndarray, shape (...)
-        θ = 1/2 + atan((2t − 1) tan(‖ω₀‖/2))/‖ω₀‖, accurate to a few eps times max(1, abs(θ)).
-        Derivatives have a relative error of a few eps.
 
     Examples
     --------
@@ -79,7 +70,7 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     return theta_bend(t, angle, s) if order == 2 else theta_third(t, angle, s)
 
 
-@described_by(theta)
+@described_by(theta, returns="(...)")
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return the position f(t) for which the projection has constant speed, or a derivative.
 
@@ -89,19 +80,14 @@ def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
 
     For the angle 0, the limit f(t) = t is returned. The angle π is singular: f is 0 at t = 0, 1 at
     t = 1, and 1/2 at all times in between. For `numpy.pi`, which is less than π by 1.2e-16, f' is
-    about 1e16 at the ends.
+    about 1e16 at the ends. f(t) is sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)). The result has a
+    relative error of a few eps.
     Source: BK Cor. 2.
 
     Parameters
     ----------
     t : array_like, shape (...)
         Times in [0, 1].
-
-    Returns
-    -------
-    ndarray, shape (...)
-        sin(‖ω₀‖ t)/(sin(‖ω₀‖ (1 − t)) + sin(‖ω₀‖ t)) or a derivative, with a relative error of a
-        few eps.
 
     Examples
     --------
