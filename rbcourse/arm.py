@@ -43,6 +43,7 @@ class Posture(NamedTuple):
     frames: Array
 
 
+@described_by(returns="Posture")
 def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     """Return the positions of the joints and the tip, and the frames of the links.
 
@@ -55,10 +56,6 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
         previous link.
     lengths : array_like, shape (n,), optional
         Lengths of the links, above 0.
-
-    Returns
-    -------
-    Posture
 
     Examples
     --------

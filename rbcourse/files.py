@@ -217,7 +217,7 @@ def load_plan(file: File, kind: str) -> Commands:
     list of (ndarray, float)
         Commands (velocity, duration), as in the example of `save_plan`.
     """
-    lines = csv_lines(file)
+    lines = ((place, _cells(place, line)) for place, line in text_lines(file))
     place, header = next(lines, (f"{file}, line 1", []))
     names = [*_velocities(kind, max(0, len(header) - 1)), DURATION]
     if header != names:
@@ -323,12 +323,6 @@ def _row(place: str, names: list[str], cells: list[str]) -> tuple[str, list[floa
         raise ValueError(f"{place}: {len(names)} numbers are wanted, got {len(cells)}")
     numbers = zip(names, cells, strict=True)
     return place, [to_number(f"{place}, {name}", cell) for name, cell in numbers]
-
-
-def csv_lines(file: File) -> Iterator[tuple[str, list[str]]]:
-    """Yield the place and the cells of each line of a CSV file."""
-    for place, line in text_lines(file):
-        yield place, _cells(place, line)
 
 
 def _cells(place: str, line: str) -> list[str]:

@@ -267,11 +267,6 @@ def as_command(name: str, command: tuple[ArrayLike, float], size: int | str) -> 
     return as_single(f"{name} velocity", velocity, size), float(d)
 
 
-def as_states(path: ArrayLike) -> Array:
-    """Return a path as an array of shape (states, k); raise ValueError if it has no state."""
-    return as_single("path", path, "states", "k")
-
-
 def interpolate(start: Array, goal: Array, steps: int) -> Array:
     """Interpolate linearly in equal steps; entries that are equal in start and goal are kept."""
     t = np.linspace(0, 1, as_count("steps", steps) + 1)

@@ -61,7 +61,7 @@ from rbcourse.draw.animate import Animation, Update, animate
 from rbcourse.draw.arm import describe_arm, moving_arm
 from rbcourse.draw.plane import describe_route, extent_of, moving_route
 from rbcourse.draw.spheres import describe_images, moving_images
-from rbcourse.planar import Plan, as_states, interpolate_planar, propagate_planar
+from rbcourse.planar import Plan, interpolate_planar, propagate_planar
 from rbcourse.projection import is_se, is_so, project_se, project_so
 from rbcourse.quaternion import (
     is_unit_quaternion,
@@ -361,7 +361,7 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
     >>> figure, animation = visualize_arm_path([[0, 0], [0, 1.57]])
     >>> plt.close(figure)
     """
-    states = as_states(path)
+    states = as_single("path", path, "states", "k")
     alt = describe_arm(states, lengths)
     return _show_path("arm_path", alt, states, lambda ax, p: moving_arm(ax, states, p, lengths))
 

@@ -246,9 +246,8 @@ def adjoint_se3(A: ArrayLike) -> Array:
 
 @described_by(__doc__, returns="(..., 6)")
 def twist_from_rates(A: ArrayLike, w: ArrayLike, d_dot: ArrayLike) -> Array:
-    """Return the twist (ω, v) of a body from ω in the body frame and ḋ in the fixed frame.
+    """Return the twist (ω, Rᵀ ḋ) of a body from ω in the body frame and ḋ in the fixed frame.
 
-    The twist is (ω, Rᵀ ḋ).
     Source: BK 6.3, which states end velocities by ω and ḋ.
 
     Examples

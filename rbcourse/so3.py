@@ -140,8 +140,8 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     """Return the matrix J for which J w' is the body angular velocity along exp_so3(w(t)).
 
     The transpose of J is the left Jacobian, which gives the angular velocity in the fixed frame.
-    Singular set: J is smooth, but has rank 1 if ‖w‖ = 2π, 4π, … J is I − (1 − cos a)/a n̂ + (1 −
-    sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps.
+    J is I − (1 − cos a)/a n̂ + (1 − sin a/a) n̂² with a = ‖w‖ and n = w/a, accurate to a few eps.
+    Singular set: J is smooth, but has rank 1 if ‖w‖ = 2π, 4π, …
     Source: BK 2.5.
 
     Examples

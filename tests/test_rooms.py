@@ -233,13 +233,13 @@ def test_clients_use_exported_names_only():
         ("from rbcourse import hat", ["hat"]),
         ("from rbcourse.so3 import exp_so3", ["so3.exp_so3"]),
         ("from rbcourse._numerics import Array", ["_numerics.Array"]),
-        ("from rbcourse.planar import as_states", ["planar.as_states"]),
+        ("from rbcourse.planar import as_plan", ["planar.as_plan"]),
         ("import rbcourse.optimum._search", ["optimum._search.*"]),
         ("from rbcourse.curves.ends import Ends", ["curves.ends.Ends"]),
         ("from rbcourse.optimum.excess import SPEED_LIMIT", ["optimum.excess.SPEED_LIMIT"]),
         ("from rbcourse.draw.save import save_figure, _text", ["draw.save._text"]),
         ("import rbcourse as rb\nrb.search.ball", ["search"]),
-        ("import rbcourse as rb\nrb.files.csv_lines", ["files.csv_lines"]),
+        ("import rbcourse as rb\nrb.files.text_lines", ["files.text_lines"]),
     ],
 )
 def test_names_that_are_not_exported_are_reported(text, found):

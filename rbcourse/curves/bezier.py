@@ -25,7 +25,7 @@ from rbcourse.so3 import exp_so3, log
 Legs = tuple[Array, Array, Array]
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def bezier(
     start: ArrayLike,
     goal: ArrayLike,
@@ -37,6 +37,7 @@ def bezier(
 ) -> Curve:
     """Return the cubic Bézier curve with these ends, by de Casteljau's algorithm with geodesics.
 
+    The control points are R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1.
     Source: BK 1, its references 3 to 5; for ``long``, beyond BK 10.
 
     Parameters
@@ -44,12 +45,6 @@ def bezier(
     long : bool, optional
         Whether the middle leg turns the other way round. If the end velocities are large, this
         curve may cost less.
-
-    Returns
-    -------
-    Curve
-        A curve with the control points R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1. It meets all four
-        boundary conditions.
 
     Notes
     -----
@@ -76,7 +71,7 @@ def bezier(
     return moving(given, _bezier(given, (first, middle, last)))
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def cumulative_bezier(
     start: ArrayLike,
     goal: ArrayLike,
@@ -88,15 +83,10 @@ def cumulative_bezier(
     """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
 
     This curve is faster to evaluate than `bezier`.
+    The turns are v₁ = w0/3, v₃ = w1/3, and the shortest turn v₂ from R0 exp(ŵ0/3) to R1 exp(−ŵ1/3).
+    The weights are β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³. The curve has the given ends.
     Source: BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit
     quaternion curves with simple high order derivatives, SIGGRAPH 1995.
-
-    Returns
-    -------
-    Curve
-        The curve with v₁ = w0/3, v₃ = w1/3, the shortest turn v₂ from R0 exp(ŵ0/3) to R1
-        exp(−ŵ1/3), and β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³. It meets all four boundary
-        conditions.
 
     Notes
     -----
@@ -117,7 +107,7 @@ def cumulative_bezier(
     return moving(given, CumulativeBezier(duration=given.duration, start=first, controls=halves))
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def corrected_bezier(
     start: ArrayLike,
     goal: ArrayLike,
@@ -128,13 +118,9 @@ def corrected_bezier(
 ) -> Curve:
     """Return the Bézier curve minus its leading deviation from the optimum.
 
+    The curve is R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B(t) of `bezier` and δ(t) of
+    `bezier_deviation`. It has the given ends.
     Source: beyond BK 10.
-
-    Returns
-    -------
-    Curve
-        The curve R_m exp(−δ̂/2) R_mᵀ B(t) exp(−δ̂/2), with B(t) of `bezier` and δ(t) of
-        `bezier_deviation`. It meets all four boundary conditions.
 
     Notes
     -----

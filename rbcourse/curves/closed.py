@@ -33,7 +33,7 @@ from rbcourse.quaternion import quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import hat, log, right_jacobian_inverse_so3
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def exponential_cubic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -45,18 +45,14 @@ def exponential_cubic(
 ) -> Curve:
     """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a cubic in exponential coordinates.
 
+    The cubic has σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
+    `right_jacobian_inverse_so3`.
     Source: BK 1, its reference 13; for ``long``, beyond BK 10.
 
     Parameters
     ----------
     long : bool, optional
         Whether the curve turns the other way round, by 2π − ‖log_so3(R0ᵀ R1)‖.
-
-    Returns
-    -------
-    Curve
-        The curve with σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
-        `right_jacobian_inverse_so3`. It meets all four boundary conditions.
 
     Notes
     -----
@@ -77,7 +73,7 @@ def exponential_cubic(
     return moving(given, _exponential_cubic(given, other_way(turn) if long else turn))
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def quaternion_cubic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -88,15 +84,10 @@ def quaternion_cubic(
 ) -> Curve:
     """Return the cubic in R⁴ with these ends, projected onto the unit quaternions.
 
+    The cubic has q' = q (0, w)/2 at its ends. It ends at q1 or −q1, whichever is nearer to q0. If
+    ‖w0‖ and ‖w1‖ are below 8 / duration, the curve turns the short way; for faster ends, it can
+    turn by two more full turns. The curve has a ``margin``.
     Source: BK 1, its references 6 and 7; BK Remark 7.
-
-    Returns
-    -------
-    Curve
-        A curve that has a ``margin`` and meets all four boundary conditions. The cubic has
-        q' = q (0, w)/2 at its ends. It ends at q1 or −q1, whichever is nearer to q0. If ‖w0‖ and
-        ‖w1‖ are below 8 / duration, the curve turns the short way; for faster ends, it can turn by
-        two more full turns.
 
     Notes
     -----
@@ -130,7 +121,7 @@ def normalised_cubic(
     return QuaternionCubic(duration=T, start=goal, controls=controls)
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def cayley_cubic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -141,14 +132,10 @@ def cayley_cubic(
 ) -> Curve:
     """Return the cubic with these ends in Cayley parameters about R0.
 
+    The quaternion of the curve is (1, g), divided by its norm. The Cayley parameters of a turn by
+    the angle a about the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w +
+    (g·w) g.
     Source: BK 1, its reference 8.
-
-    Returns
-    -------
-    Curve
-        A curve whose quaternion is (1, g), divided by its norm. The Cayley parameters of a turn by
-        the angle a about the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w +
-        (g·w) g.
 
     Notes
     -----
@@ -175,7 +162,7 @@ def cayley_cubic(
     return moving(given, CayleyCubic(duration=T, start=goal, controls=controls))
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def normal_cubic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -187,6 +174,8 @@ def normal_cubic(
 ) -> Curve:
     """Return the cubic with these ends in second-order normal coordinates of a body's metric.
 
+    The curve is R0 exp(ŷ) with y = x − ½ G⁻¹(x × G x). Here x(t) is the cubic with x(0) = 0,
+    x'(0) = w0 and the values of x(1) and x'(1) that give R1 and w1.
     Source: beyond BK 7; R. Zimmermann, Hermite interpolation and data processing errors on
     Riemannian matrix manifolds, SIAM Journal on Scientific Computing 2020.
 
@@ -194,12 +183,6 @@ def normal_cubic(
     ----------
     body : Body
         The body that moves.
-
-    Returns
-    -------
-    Curve
-        The curve R0 exp(ŷ) with y = x − ½ G⁻¹(x × G x). Here x(t) is the cubic with x(0) = 0,
-        x'(0) = w0 and the values of x(1) and x'(1) that give R1 and w1.
 
     Notes
     -----
@@ -241,7 +224,7 @@ def normal_cubic(
     return moving(given, rotation)
 
 
-@described_by(projected_quintic)
+@described_by(projected_quintic, returns="Curve")
 def exponential_quintic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -254,13 +237,9 @@ def exponential_quintic(
 ) -> Curve:
     """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a quintic.
 
+    The quintic has σ(0) = 0, σ(1) = log_so3(R0ᵀ R1) and the derivatives that give w and w' at both
+    ends.
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
-
-    Returns
-    -------
-    Curve
-        The curve with σ(0) = 0, σ(1) = log_so3(R0ᵀ R1) and the derivatives of σ that give w and w'
-        at both ends.
 
     Notes
     -----

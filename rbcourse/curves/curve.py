@@ -6,20 +6,22 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from html import escape
 from typing import Any, Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_array, as_duration, as_time, check_broadcast, check_order
+from rbcourse._docs import described_by
 from rbcourse._hermite import hermite
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse._quaternions import Jet, angular_velocity, multiply, rotation
 from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import Body, of_point
-from rbcourse.curves._html import curve_html
 
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
+_WIDTH, _HEIGHT = 240, 60  # of pictures
 BALL = Body.ball()
 Order: TypeAlias = Literal[0, 1, 2, 3]
 
@@ -158,6 +160,7 @@ class Curve:
         values = self.evaluate(times.reshape(-1, 1), order)
         return values.reshape(times.shape + self.batch_shape + self._core(order))
 
+    @described_by(__call__)
     def state(self, t: ArrayLike) -> State:
         """Return the pose (or rotation), the velocity and the acceleration, in one pass.
 
@@ -213,15 +216,11 @@ class Curve:
         except SingularTime as error:
             raise SingularTime(error.time, i, error.reason) from None
 
+    @described_by(__call__)
     def twist_rate(self, t: ArrayLike) -> Array:
         """Return the derivative of ``c(t, 1)``.
 
         On SO(3), it is ``c(t, 2)``. On SE(3), it is (w', v') with v' = Rᵀ d'' − w × v.
-
-        Parameters
-        ----------
-        t : array_like, shape t.shape
-            Times in the domain.
 
         Examples
         --------
@@ -363,7 +362,7 @@ class Curve:
 
     def _repr_html_(self) -> str:
         """Return the description, and a picture of the speeds, for notebooks."""
-        return curve_html(self)
+        return _html(self)
 
     def _what(self) -> str:
         return type(self).__name__
@@ -635,3 +634,37 @@ def least_over_time(
         centre = np.take_along_axis(times, least, axis=0)[0]
         reach, count = 2 * reach / (count - 1), 17
     return centre, np.take_along_axis(values, least, axis=0)[0]
+
+
+def _html(curve: Curve) -> str:
+    """Return the description of a curve and, for a single curve, a picture of its speeds."""
+    words = escape(repr(curve)[1:-1])
+    if curve.batch_shape:
+        return f"<div>{words}</div>"
+    try:
+        rates = curve(np.linspace(*curve.domain, 121), 1)
+    except (RuntimeError, ValueError):  # the curve jumps
+        return f"<div>{words}</div>"
+    drawn = _graph(rates[:, :3], "#0072b2", "‖ω‖", "rad")
+    if curve.size == 4:
+        drawn += _graph(rates[:, 3:], "#d55e00", "‖v‖", "m")
+    return f"<div>{words}<br>{drawn}</div>"
+
+
+def _graph(rates: Array, colour: str, name: str, unit: str) -> str:
+    """Return a small graph of the norm over time, from 0 to its largest value."""
+    speed = np.linalg.norm(rates, axis=-1)
+    largest = speed.max()
+    if not np.isfinite(largest):
+        return ""
+    x = np.linspace(2, _WIDTH - 2, len(speed))
+    y = _HEIGHT - 2 - (_HEIGHT - 4) * speed / (largest or 1)
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    line = f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>'
+    frame = f'<path d="M1 1V{_HEIGHT - 1}H{_WIDTH}" fill="none" stroke="currentColor"/>'
+    label = f"{name} up to {largest:.3g} {unit} per unit of time"
+    return (
+        f'<span style="display:inline-block;margin-right:1em;font-size:small">{label}<br>'
+        f'<svg width="{_WIDTH}" height="{_HEIGHT}" role="img" aria-label="{label}">'
+        f"{frame}{line}</svg></span>"
+    )

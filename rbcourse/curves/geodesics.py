@@ -72,7 +72,7 @@ def geodesic_data(given: Given) -> tuple[Array, Array]:
     return turn, np.stack([R0, swept, swept @ K], axis=-3)
 
 
-@described_by(geodesic)
+@described_by(geodesic, returns="ScrewMotion")
 def screw(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) -> ScrewMotion:
     """Return the screw motion between two poses, which has one fixed axis and a constant twist.
 
@@ -80,17 +80,13 @@ def screw(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) -> Sc
     axis (see `screw_from_pose`). A screw motion is a geodesic of the indefinite metric (10), not of
     metric (14) (see `geodesic`). Singular set: the poses are a half-turn apart. `log_so3` then
     chooses one of two ω. Additional full turns give other screw motions, with other twists.
+    The motion is A0 exp_se3(S t) with the ``twist`` S = log_se3(A0⁻¹ A1), and turns by at most π.
     Source: BK 2.6.
 
     Parameters
     ----------
     start, goal : array_like, shape (..., 4, 4)
         Poses A0 and A1.
-
-    Returns
-    -------
-    ScrewMotion
-        The motion A0 exp_se3(S t) with ``twist`` S = log_se3(A0⁻¹ A1). It turns by at most π.
 
     Examples
     --------
@@ -187,20 +183,17 @@ class ScrewMotion(Curve):
         return np.broadcast_to(S, (len(t), *S.shape))
 
 
+@described_by(returns="Screw")
 def screw_from_pose(A: ArrayLike) -> Screw:
     """Return the screw of a displacement in the fixed frame: axis, point, angle and slide.
 
+    The screw also has the ``pitch``, the slide per radian of the turn.
     Source: BK 2.6.
 
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
         Poses. For the screw in the fixed frame that takes A0 to A1, use A1 @ inverse_se3(A0).
-
-    Returns
-    -------
-    Screw
-        The screw; it also has ``pitch``, the slide per radian of the turn.
 
     Notes
     -----
