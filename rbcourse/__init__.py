@@ -62,9 +62,8 @@ from rbcourse.body import Body
 from rbcourse.curves.chain import Chain, chain, joined, projected_spline, quaternion_spline
 from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts, jerk_cost, torque_cost
 from rbcourse.curves.curve import Curve
-from rbcourse.curves.geodesics import geodesic, screw, screw_from_pose
+from rbcourse.curves.geodesics import geodesic, projected_line, screw, screw_from_pose
 from rbcourse.curves.projected import projected_cubic, projected_quintic
-from rbcourse.curves.projected_line import projected_line
 from rbcourse.curves.timing import Limits, Timed, fastest, limits_used
 from rbcourse.curves.velocities import bessel_velocities, spline_velocities
 from rbcourse.files import read_path, write_path

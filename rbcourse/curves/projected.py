@@ -190,7 +190,7 @@ def projected_cubic(
     return moving(given, watched(curve))
 
 
-@described_by(projected_cubic)
+@described_by(projected_cubic, returns="Curve")
 def projected_quintic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -203,6 +203,9 @@ def projected_quintic(
 ) -> Curve:
     """Return the projected quintic with these ends, which include accelerations.
 
+    The curve has the attribute ``margin``. For rotations, it consists of the nearest rotations to
+    the quintic M(t) that has the values R, the first derivatives R ŵ and the second derivatives
+    R (ŵ² + â) at both ends. For poses, this is the ``rotation``, and the origin moves on a quintic.
     Source: BK 6, BK Prop. 3.
 
     Parameters
@@ -210,14 +213,6 @@ def projected_quintic(
     a0, a1 : array_like, shape (..., 3) or (..., 6), optional
         Accelerations at both ends as ``c(t, 2)`` returns them: w', or (w', Rᵀ d''), per unit time
         squared. The default is 0.
-
-    Returns
-    -------
-    Curve
-        A curve with the attribute ``margin``. For rotations, it consists of the nearest rotations
-        to the quintic M(t) that has the values R, the first derivatives R ŵ and the second
-        derivatives R (ŵ² + â) at both ends. For poses, this is the ``rotation``, and the origin
-        moves on a quintic. The curve meets all boundary conditions exactly.
 
     Notes
     -----
