@@ -103,12 +103,17 @@ def chain(
     if accelerations is not None:
         if velocities is None:
             raise ValueError("accelerations: not without velocities")
-        shape = velocities.shape
-        array = as_single("accelerations", accelerations, "N", shape[1])
-        if array.shape != shape:
-            raise ValueError(f"accelerations: shape {shape} is wanted, got {array.shape}")
-        rates.append(array)
-    return _chain(leg or projected_cubic, times, poses, *rates)
+        rates.append(as_single("accelerations", accelerations, *velocities.shape))
+    ends = [x for values in (poses, *rates) for x in (values[:-1], values[1:])]
+    legs = _made(leg or projected_cubic, ends, np.diff(times))
+    _check_arrival(legs, poses)
+    return Chain(
+        duration=np.array(times[-1] - times[0]),
+        body=legs.body,
+        times=times,
+        legs=legs,
+        velocities=velocities,
+    )
 
 
 @described_by(spline_velocities)
@@ -189,7 +194,7 @@ def quaternion_spline(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natu
     V = quaternion_system(h, poses[:, :3, :3]).solve(turning)
     if poses.shape[-1] == 4:
         V = np.append(V, path_velocities(h, poses, V, conditions, np.zeros(3)), axis=1)
-    return _chain(quaternion_cubic, times, poses, V)
+    return chain(times, poses, V, leg=quaternion_cubic)
 
 
 def joined(rotation: Curve, position: Position) -> Curve:
@@ -446,21 +451,6 @@ def _at_ends(legs: Curve, order: Order) -> Array:
     return legs.at_own_times(np.stack([0 * legs.duration, legs.duration]), order)
 
 
-def _chain(leg: Leg, times: Array, poses: Array, *rates: Array) -> Chain:
-    ends = [x for values in (poses, *rates) for x in (values[:-1], values[1:])]
-    legs = _made(leg, ends, np.diff(times))
-    _check_arrival(legs, poses)
-    if legs.body.batch_shape:
-        raise ValueError("leg: the same body for all legs is wanted")
-    return Chain(
-        duration=np.array(times[-1] - times[0]),
-        body=legs.body,
-        times=times,
-        legs=legs,
-        velocities=rates[0] if rates else None,
-    )
-
-
 def _made(leg: Leg, ends: list[Array], duration: Array) -> Curve:
     try:
         signature(leg).bind(*ends, duration=duration)
@@ -475,7 +465,7 @@ def _made(leg: Leg, ends: list[Array], duration: Array) -> Curve:
         except ValueError as error:
             raise ValueError(f"leg: {error}") from error
     for warning in warned:
-        warnings.warn(warning.message, stacklevel=4)
+        warnings.warn(warning.message, stacklevel=3)
     count, size = len(duration), ends[0].shape[-1]
     if not isinstance(legs, Curve) or not np.array_equal(legs.duration, duration):
         raise ValueError(
@@ -484,6 +474,8 @@ def _made(leg: Leg, ends: list[Array], duration: Array) -> Curve:
     if legs.size != size:
         given = f"({legs.size}, {legs.size})"
         raise ValueError(f"leg: curves of shape ({size}, {size}) are wanted, got {given}")
+    if legs.body.batch_shape:
+        raise ValueError("leg: the same body for all legs is wanted")
     return legs
 
 

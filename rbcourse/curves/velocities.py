@@ -89,8 +89,8 @@ def spline_velocities(
 
     Notes
     -----
-    If the poses are moved or the times are reversed, the velocities are those of the new path. For
-    rotations about one axis by small angles, the velocities are those of SciPy's ``CubicSpline``.
+    If the poses are moved, the velocities move with them; reversed times reverse them. For
+    rotations about one axis by small angles, they are those of SciPy's ``CubicSpline``.
     Singular set: successive poses a half-turn apart (up to 1e-6) raise ValueError.
 
     Examples

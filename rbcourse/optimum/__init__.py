@@ -1,7 +1,6 @@
 """Curves of least acceleration, torque or jerk: between two poses, and through many.
 
-The functions for two poses are in `two_poses`, and those for many poses in `many_poses`. The engine
-is in private modules: `_search` finds starting curves, `_guesses` lowers their costs,
+In private modules, `_search` chooses starting curves, `_guesses` makes them and lowers their costs,
 `_collocation` solves the equation R p = c by Newton's method, `_spline` does this for all legs of a
 path together, and `_second_variation` proves that a solution is a local minimum.
 """

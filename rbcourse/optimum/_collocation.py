@@ -16,7 +16,7 @@ short, and then on more nodes until the last Chebyshev coefficients have decayed
 
 from __future__ import annotations
 
-from copy import copy
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple, Self, TypeAlias, TypeVar
 
@@ -79,8 +79,7 @@ def relax(equations: Stationary, R: Array) -> Results:
     """
     found: Results = []
     for some in blocks(len(R), TOGETHER):
-        problems = equations.take(some)
-        problems.coarse = R.shape[1]
+        problems = replace(equations.take(some), coarse=R.shape[1])
         found += _attempt(problems, R[some])
     return found
 
@@ -233,25 +232,23 @@ class Errors(NamedTuple):
     lacking: Array
 
 
+@dataclass(frozen=True, eq=False)
 class Stationary:
     """The equation R p = c for any functional, for a stack of problems.
 
     `ends` contains w0 and w1, and for the jerk also a0 and a1; its shape is (N, m, 3).
     """
 
-    coarse: int  # the number of nodes of the linear systems of `BallStationary`
-
-    def __init__(self, functional: Functional, R0: Array, R1: Array, ends: Array) -> None:
-        self.functional = functional
-        self.R0 = R0
-        self.R1 = R1
-        self.ends = ends
+    functional: Functional
+    R0: Array
+    R1: Array
+    ends: Array
+    coarse: int = 17  # the number of nodes of the linear systems of `BallStationary`
 
     def take(self, index: Any) -> Self:
-        some = copy(self)
-        some.functional = self.functional.take(index)
-        some.R0, some.R1, some.ends = self.R0[index], self.R1[index], self.ends[index]
-        return some
+        functional = self.functional.take(index)
+        R0, R1, ends = (x[index] for x in (self.R0, self.R1, self.ends))
+        return replace(self, functional=functional, R0=R0, R1=R1, ends=ends)
 
     def nodes(self, n: int) -> tuple[int, ...]:
         return n, *(more for more in NODES if more > n)

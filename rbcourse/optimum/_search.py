@@ -298,7 +298,8 @@ class BodySearch(Search):
         t = grid(n).t[:, None]
         bump = (4 * t * (1 - t)) ** 2
         sides = LIMITS.bend * _across(w / size, self.functional.G[i])
-        R = on_nodes(one.R[None], n) @ cayley(bump * sides[:, None])
+        R = on_nodes(one.R[None], n)
+        R = R @ cayley(bump * sides[:, None])
         problem = np.full(len(sides), i)
         return Curves.of(problem, R)
 
@@ -337,7 +338,8 @@ def _of_slow_ends(ends: Ends, equations: BallStationary) -> dict[int, Solution |
     12 (2π − 2)² > 200. No second stationary curve that turns the short way was found, but a proof
     is missing.
     """
-    sizes = np.abs([log(ends.turn), ends.w0, ends.w1])
+    turn = log(ends.turn)
+    sizes = np.abs([turn, ends.w0, ends.w1])
     slow = np.flatnonzero(sizes.max(axis=(0, 2)) < LIMITS.one_start)
     if not len(slow):
         return {}
@@ -359,6 +361,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     of_balls = cheapest(ball(given))
     deviation = np.abs(functional.G - np.eye(3))
     is_ball = deviation.max(axis=(1, 2)) < 8 * EPS
+    balls = np.flatnonzero(is_ball)
     moments = np.linalg.eigvalsh(functional.G)
     is_rod = moments[:, 2] > LIMITS.rod * moments[:, 0]
 
@@ -373,7 +376,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
         equations=Stationary(functional, ends.R0, ends.R1, rates),
         starts=start,
         nodes=np.where(is_rod, LIMITS.nodes_for_rods, LIMITS.nodes),
-        known={i: of_balls[i] for i in np.flatnonzero(is_ball).tolist()},
+        known={i: of_balls[i] for i in balls.tolist()},
     )
 
 
@@ -383,7 +386,8 @@ def _on_nodes(results: Results, n: int) -> Curves:
     for i, one in enumerate(results):
         if isinstance(one, Solution):
             R = on_nodes(one.R[None], n)
-            curves.append(Curves.of(np.array([i]), R))
+            problem = np.array([i])
+            curves.append(Curves.of(problem, R))
     return Curves.none(n).joined(*curves)
 
 
@@ -410,4 +414,5 @@ def _flat(given: Ends, *accelerations: Array) -> tuple[Ends, Array]:
     R1, _ = nearest(ends.R1)
     ends = ends._replace(R0=R0, R1=R1)
     more = [a.reshape(-1, 3) for a in accelerations]
-    return ends, np.stack([ends.w0, ends.w1, *more], axis=1)
+    rates = np.stack([ends.w0, ends.w1, *more], axis=1)
+    return ends, rates

@@ -108,9 +108,8 @@ class Problem(NamedTuple):
     def equations(self, values: Array, n: int) -> Stationary:
         of_ball = isinstance(self.functional, BallAcceleration)
         kind = BallStationary if of_ball else Stationary
-        equations = kind(self.functional, self.R[:-1], self.R[1:], self.own(values))
-        equations.coarse = 9 if n < 33 else 17
-        return equations
+        coarse = 9 if n < 33 else 17
+        return kind(self.functional, self.R[:-1], self.R[1:], self.own(values), coarse)
 
     def own(self, values: Array) -> Array:
         """Return w0, w1 (and a0, a1) of the legs for times from 0 to 1, shape (N − 1, m, 3)."""

@@ -200,11 +200,8 @@ class OptimalChain(Chain):
 
     Attributes
     ----------
-    cost : float
-        The `acceleration_cost`, `torque_cost` or `jerk_cost` for the body of the curve.
-    certified : bool
-        Whether the chain is proven to be a strict local minimum: all nearby curves through the same
-        poses with the same ends cost more (see `Optimum`).
+    cost, certified : float, bool
+        As for `Optimum`; all nearby curves through the same poses cost more than a certified chain.
     definite : bool
         Whether the second derivative of the cost with respect to the values at the poses is
         positive definite. This is False if a family of curves has the same cost, for example if a
@@ -212,8 +209,8 @@ class OptimalChain(Chain):
     c : ndarray, shape (N − 1, 3)
         The constant R p of each leg in the fixed frame.
     residual, iterations, converged : float, int, bool
-        The largest residual of the legs, and the number of steps of Newton's method. `converged` is
-        always True, since a failure raises ConvergenceError.
+        The largest residual of the legs, the number of steps of Newton's method, and True, since a
+        failure raises ConvergenceError.
     """
 
     velocities: Array
