@@ -79,8 +79,7 @@ class Limit:
     """The limit ‖a u + b x + k‖ ≤ 1 on the norm of a vector, or on each of its three components.
 
     The motion has the velocity V s' and the acceleration V u + A x in the body frame, with
-    V = c(s, 1) and A = c(s, 2). For a limit on a speed, a = k = 0, and b is the square of the share
-    that is used at s' = 1.
+    V = c(s, 1) and A = c(s, 2). For a speed, a = k = 0, and b is the squared share at s' = 1.
     """
 
     name: str

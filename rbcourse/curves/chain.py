@@ -57,8 +57,7 @@ def chain(
     poses : array_like, shape (N, 3, 3) or (N, 4, 4)
         A rotation matrix or a pose for each of the times.
     velocities : array_like, shape (N, 3) or (N, 6), optional
-        Angular velocities or twists (ω, v) at the poses, in the body frame. They are required
-        unless `leg` is given.
+        Angular velocities or twists (ω, v) at the poses, in the body frame; required without `leg`.
     accelerations : array_like, shape (N, 3) or (N, 6), optional
         Accelerations at the poses as ``c(t, 2)`` returns them, for quintic legs.
     leg : callable, optional

@@ -95,8 +95,7 @@ def acceleration_cost_parts(
     Returns
     -------
     rotation, translation : ndarray, shape curve.batch_shape
-        The rotation costs ∫ τᵀ G⁻¹ τ dt, for the ball ∫ 2 ‖w'‖² dt. The translation costs ∫ m
-        ‖d_c''‖² dt, or 0 on SO(3).
+        The costs ∫ τᵀ G⁻¹ τ dt, for the ball ∫ 2 ‖w'‖² dt, and ∫ m ‖d_c''‖² dt, or 0 on SO(3).
 
     Examples
     --------

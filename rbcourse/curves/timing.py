@@ -89,8 +89,7 @@ def fastest(
     ------
     ValueError
         If the whole path stands still, if no limit bounds the speed, if the force cannot hold the
-        body at rest, or if the `rates` are out of reach. The message names the first place on the
-        path by its s, as in `Timed`.
+        body at rest, or if the `rates` are out of reach. The message names the first s of the path.
     MemoryError
         If the cells need more memory than the computer has.
 

@@ -74,8 +74,7 @@ def spline_velocities(
         body frame: angular velocities, shape (3,), or twists (ω, v), shape (6,). None in a pair
         means a natural end.
     rest_at : sequence of int, optional
-        The indices of other poses at which the velocity is 0. A repeated pose is not such a pose
-        unless it is listed here.
+        The indices of other poses at which the velocity is 0; repeated poses are not implied.
     body : Body, optional
         The body that moves, by default the ball of metric (12). Each of its principal moments is at
         most the sum of the other two. The torque is then continuous, and the centre of mass moves

@@ -1,7 +1,6 @@
 """Newton's method for optima between two poses, with values at Chebyshev nodes as unknowns.
 
-The unknowns are R and the highest derivative k = w⁽ᵐ⁾ at the nodes, and the constant c. The
-equations are
+The unknowns are R and the highest derivative k = w⁽ᵐ⁾ at the nodes, and c. The equations are
 
     R = R0 + ∫ R ŵ dt,    R(1) = R1,    p(w, w', …, k) = Rᵀ c,
 
@@ -45,8 +44,7 @@ Record = TypeVar("Record", bound=NamedTuple)
 class Solution(NamedTuple):
     """A solution of R p = c, with R and the highest derivative k of w at the nodes.
 
-    The cost is ∫ ‖u‖² dt. `beaten` is True if a known curve costs less, but Newton's method fails
-    when it starts from that curve.
+    The cost is ∫ ‖u‖² dt. A solution is `beaten` by a known curve from which Newton's method fails.
     """
 
     R: Array
@@ -160,9 +158,8 @@ def joined(records: list[Record]) -> Record:
 class Iterates(NamedTuple):
     """The state of Newton's method for a stack of problems on one set of nodes.
 
-    `number` is the index of a problem in the stack that `_relax` solves, `left` its largest error,
-    and `turned` the largest turn of a node by its last step. A problem stops if it is `solved` or
-    needs a `finer` set of nodes.
+    `number` is the index of a problem in the stack of `_relax`, `left` its largest error, `turned`
+    its largest turn by the last step. A problem stops if it is `solved` or needs `finer` nodes.
     """
 
     R: Array

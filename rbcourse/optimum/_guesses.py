@@ -100,9 +100,8 @@ class Curves:
 def starts(ends: Ends, n: int, *accelerations: Array) -> Curves:
     """Return two starting curves at n nodes for each problem, and two more if its ends are fast.
 
-    They turn the short way and the long way, and do not depend on the choice of frames. The ends
-    R1, R0, −w1, −w0 give the reversed curves. If all vectors are along one axis, the number of full
-    turns is the best one.
+    They turn the short and the long way, and do not depend on the frames. The ends R1, R0, −w1, −w0
+    give the reversed curves. If all vectors are along one axis, the number of full turns is best.
     """
     speeds = np.linalg.norm([ends.w0, ends.w1, *(a / 2 for a in accelerations)], axis=-1)
     fast = speeds.sum(axis=0) > FAST
@@ -158,8 +157,7 @@ def _beside_free_end(ends: Ends, n: int, *accelerations: Array) -> Curves:
 def _both_ways(goal: Array, hint: Array) -> Array:
     """Return two logarithms of `goal`: the shortest one, and the one that turns the other way.
 
-    If the shortest one is 0, the other one is along `hint`. Rounding does not choose between two
-    turns by π.
+    If the first one is 0, the other is along `hint`. Rounding does not choose between turns by π.
     """
     v = log(goal)
     angle = np.linalg.norm(v, axis=-1, keepdims=True)

@@ -53,8 +53,7 @@ def minimum_acceleration_spline(
     body : Body, optional
         The body that moves, by default the ball of metrics (12) and (14).
     long : array_like of bool, shape (N − 1,), optional
-        Whether each leg of the starting curve turns the long way, by 2π minus the least angle. One
-        value holds for all legs.
+        Whether each leg of the starting curve (or all legs) turns by 2π minus the least angle.
 
     Returns
     -------
@@ -140,8 +139,7 @@ def minimum_torque_spline(
     Returns
     -------
     OptimalChain
-        The chain with the least `torque_cost` that was found. The torque is continuous, and 0 at
-        natural ends.
+        The chain of least `torque_cost` found; the torque is continuous, and 0 at natural ends.
 
     Examples
     --------

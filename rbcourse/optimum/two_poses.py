@@ -51,8 +51,7 @@ def minimum_acceleration(
     Optimum
         A `Curve` that meets all boundary conditions. Its ``cost`` is the `acceleration_cost`, the
         lowest that was found; ``c`` is the constant R w'' (for a body, R p of the costate p). For
-        poses, the ``rotation`` is the optimum for rotations, and the centre of mass moves on a
-        cubic.
+        poses, the ``rotation`` is optimal, and the centre of mass moves on a cubic.
 
     Raises
     ------
@@ -63,8 +62,7 @@ def minimum_acceleration(
     -----
     RuntimeWarning
         If Newton's method does not converge for some problems of a stack (their curves are NaN), or
-        if a starting curve costs less than the returned curve. In both cases, ``converged`` is
-        False for the problem.
+        if a starting curve costs less than the returned one. Then ``converged`` is False.
 
     Notes
     -----
@@ -182,8 +180,7 @@ def minimum_jerk(
     start, goal : array_like, shape (..., 3, 3)
         Rotation matrices.
     v0, v1, a0, a1 : array_like, shape (..., 3), optional
-        The angular velocities w and accelerations w' at both ends in the body frame. The default is
-        0.
+        The angular velocities w and accelerations w' at both ends in the body frame, by default 0.
     duration
         As for `minimum_acceleration`.
 
