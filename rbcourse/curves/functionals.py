@@ -168,7 +168,6 @@ class Jerk:
 
     In the metric G = 2 I, p = j'' + ½ w × j' + w' × j. Among all j = w'' + κ w × w', only this one
     assigns the same cost to a motion R(t) and to its inverse Rᵀ(t).
-
     Source: beyond BK 2, beyond BK 5; Žefran, Kumar and Croke 1998; Camarinha, Silva Leite and
     Crouch 1995.
     """

@@ -254,9 +254,8 @@ class ConvergenceError(RuntimeError):
         reason = "the end velocities may be too large, or the principal moments too different"
         if residual < EXACT:
             reason = "only a saddle was found"
-        super().__init__(
-            f"no convergence: residual {residual:.1e} after {iterations} iterations; {reason}"
-        )
+        what = f"no convergence: residual {residual:.1e} after {iterations} iterations"
+        super().__init__(f"{what}; {reason}")
         self.residual = residual
         self.iterations = iterations
 
