@@ -490,8 +490,7 @@ def _forward(cells: Cells, low: Array, high: Array) -> tuple[Array, Array]:
             else:
                 least, most = low[i + 1], high[i + 1]
             x[i] = here
-            largest = _largest(limits, here)
-            here = float(max(min(largest, most), least))
+            here = float(max(min(_largest(limits, here), most), least))
             y[i] = here
     return x, y
 

@@ -143,10 +143,7 @@ class KnotSystem(NamedTuple):
     b1: Array
 
     def solve(self, ends: Conditions) -> Array:
-        """Return the minimizer x that meets the end conditions, shape (N, m).
-
-        LinAlgError is raised if H is not positive definite.
-        """
+        """Return the minimizer x; LinAlgError is raised if H is not positive definite."""
         fixed, given, periodic = ends
         if not periodic:
             return self._solve(fixed, given[..., None])[..., 0]

@@ -133,8 +133,8 @@ class Found(NamedTuple):
 def solve_spline(problem: Problem, R: Array) -> Found | Failure:
     """Return a minimum that Newton's method finds.
 
-    No step leaves the axis of a curve that turns about one axis only. For a body, a curve that
-    leaves the axis can cost less, so a second search starts off the axis.
+    For a body, a curve that leaves an axis can cost less, but no step leaves it; so a second search
+    starts off the axis.
     """
     found = _searched(problem, R, (None, *DESCENTS))
     if not isinstance(problem.functional, Effort):
@@ -279,10 +279,7 @@ def _combined(responses: Change, ends: Array) -> Change:
 
 
 def _system(problem: Problem, legs: Legs, responses: Change) -> KnotSystem:
-    """Return the second derivative of the cost with respect to the values, and minus its gradient.
-
-    The gradient is that after a Newton step of each leg.
-    """
+    """Return the second derivative of the cost, and minus its gradient after a step of each leg."""
     scale = problem.scale
     size = scale.shape[1]
     momenta, changes = _momenta(problem.functional, legs, responses)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,7 +27,7 @@ from rbcourse.curves.velocities import (
     spline_velocities,
 )
 from rbcourse.optimum._collocation import NODES, Failure, on_nodes
-from rbcourse.optimum._result import OptimalMotion, OptimalRotation, optimum_of
+from rbcourse.optimum._result import OptimalMotion, OptimalRotation, Optimum, optimum_of
 from rbcourse.optimum._spline import Found, Problem, solve_spline
 from rbcourse.optimum.two_poses import ConvergenceError
 from rbcourse.projection import nearest
@@ -87,7 +87,8 @@ def minimum_acceleration_spline(
     0.201
     """
     times, poses, _ = checked_path(times, poses)
-    size, h = 3 * poses.shape[-1] - 6, np.diff(times)
+    size = 3 * poses.shape[-1] - 6
+    h = np.diff(times)
     of_mass = as_body(body, Body.ball())
     conditions = as_ends(ends, len(poses), size)
     rotations = conditions._replace(given=conditions.given[:, :3])
@@ -211,6 +212,7 @@ class OptimalChain(Chain):
         failure raises ConvergenceError.
     """
 
+    legs: Optimum
     velocities: Array
     cost: float
     definite: bool
@@ -221,9 +223,7 @@ class OptimalChain(Chain):
     @property
     def optimum(self) -> OptimalRotation:
         """The rotations of the legs."""
-        legs: Any = self.legs
-        found: OptimalRotation = legs.found
-        return found
+        return self.legs.found
 
     @property
     def c(self) -> Array:
