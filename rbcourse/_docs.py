@@ -2,7 +2,7 @@
 
 A docstring may leave out parameters that another function, or the docstring of the module,
 describes. When the module is imported, these entries are copied, so that `help` of each function is
-complete. The type or the shape of the result may be an argument of the decorator.
+complete. A section "Returns" of one line may be an argument of the decorator.
 """
 
 from __future__ import annotations
@@ -26,11 +26,9 @@ def described_by(
 ) -> Callable[[Function], Function]:
     """Return a decorator that copies missing descriptions of parameters from other docstrings.
 
-    If given, `returns` is the type of the result, or the shape of an array, for the section
-    "Returns".
+    If given, `returns` is the text of the section "Returns".
     """
-    kind = returns if returns.isidentifier() else f"ndarray, shape {returns}"
-    result = f"Returns\n-------\n{kind}\n\n" if returns else ""
+    result = f"Returns\n-------\n{returns}\n\n" if returns else ""
 
     def complete(function: Function) -> Function:
         if function.__doc__ is None:  # python -OO

@@ -74,7 +74,7 @@ def arm_forward_kinematics(q: ArrayLike, lengths: ArrayLike = LINKS) -> Posture:
     return Posture(joints, frames)
 
 
-@described_by(arm_forward_kinematics, returns="(..., 2, n)")
+@described_by(arm_forward_kinematics, returns="ndarray, shape (..., 2, n)")
 def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the matrix that maps joint velocities to the velocity of the tip in the world frame.
 
@@ -93,7 +93,7 @@ def arm_tip_jacobian(q: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     return np.stack([-reach[..., 1], reach[..., 0]], axis=-2)
 
 
-@described_by(returns="(..., 2, 2)")
+@described_by(returns="ndarray, shape (..., 2, 2)")
 def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     """Return the two sets of joint angles that bring the tip of a two-link arm to a position.
 
@@ -134,7 +134,7 @@ def arm_inverse_kinematics(tip: ArrayLike, lengths: ArrayLike = LINKS) -> Array:
     return np.stack([shoulder - 2 * np.pi * turns, elbow], axis=-1)
 
 
-@described_by(interpolate_planar, returns="(steps + 1, ..., n)")
+@described_by(interpolate_planar, returns="ndarray, shape (steps + 1, ..., n)")
 def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Array:
     """Interpolate joint angles linearly in equal steps, without removing full turns.
 
@@ -157,7 +157,7 @@ def interpolate_joints(start: ArrayLike, goal: ArrayLike, steps: int = 10) -> Ar
     return interpolate(start, as_finite("goal", goal, start.shape[-1]), steps)
 
 
-@described_by(returns="(commands + 1, ..., n)")
+@described_by(returns="ndarray, shape (commands + 1, ..., n)")
 def propagate_joints(start: ArrayLike, plan: Plan) -> Array:
     """Return the joint angles, with full turns, at the start and after each command of a plan.
 

@@ -28,7 +28,7 @@ __all__ = [
 ]
 
 
-@described_by(returns="(m, m, m)")
+@described_by(returns="ndarray, shape (m, m, m)")
 def structure_constants(basis: ArrayLike) -> Array:
     """Return C with [L_i, L_j] = C[k, i, j] L_k, summed over k, for a basis of a Lie algebra.
 
@@ -68,7 +68,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     return np.ldexp(C.reshape(m, m, m), i + j - k)
 
 
-@described_by(returns="(..., m, m, m)")
+@described_by(returns="ndarray, shape (..., m, m, m)")
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """Return the Christoffel symbols Γ of a left-invariant metric in a left-invariant frame.
 
@@ -106,7 +106,7 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     return (C + raised) / 2
 
 
-@described_by(returns="(..., m)")
+@described_by(returns="ndarray, shape (..., m)")
 def covariant_derivative(gamma: ArrayLike, v: ArrayLike, x: ArrayLike, x_dot: ArrayLike) -> Array:
     """Return the covariant derivative x_dot[i] + gamma[i, j, k] v[j] x[k] of a field along a curve.
 

@@ -41,7 +41,7 @@ METRIC_SE3 = np.diag([2.0, 2, 2, 1, 1, 1])
 METRIC_SO3.flags.writeable = METRIC_SE3.flags.writeable = False
 
 
-@described_by(returns="(...)")
+@described_by(returns="ndarray, shape (...)")
 def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors X, Y of GL(n) at one point.
 
@@ -62,7 +62,7 @@ def inner_gl(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, "n")
 
 
-@described_by(returns="(...)")
+@described_by(returns="ndarray, shape (...)")
 def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) = 2 x · y for tangent vectors X = R hat_so3(x), Y = R hat_so3(y).
 
@@ -83,7 +83,7 @@ def inner_so3(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, 3)
 
 
-@described_by(returns="(...)")
+@described_by(returns="ndarray, shape (...)")
 def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) of tangent vectors of GA(n), the affine maps.
 
@@ -102,7 +102,7 @@ def inner_ga(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, "n+1")
 
 
-@described_by(returns="(...)")
+@described_by(returns="ndarray, shape (...)")
 def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     """Return tr(XᵀY) = 2 ω_x · ω_y + v_x · v_y for X = A hat_se3(x), Y = A hat_se3(y).
 
@@ -125,7 +125,7 @@ def inner_se3(X: ArrayLike, Y: ArrayLike) -> Array:
     return _trace(X, Y, 4)
 
 
-@described_by(returns="(...)")
+@described_by(returns="ndarray, shape (...)")
 def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike) -> Array:
     """Return ⟨X, Y⟩ = xᵀ G y at A in the left-invariant metric with the matrix G.
 
@@ -152,7 +152,7 @@ def inner_left_invariant(G: ArrayLike, A: ArrayLike, X: ArrayLike, Y: ArrayLike)
     return np.vecdot(x, matvec(G, y))
 
 
-@described_by(returns="(6, 6)")
+@described_by(returns="ndarray, shape (6, 6)")
 def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     """Return [[alpha I, beta I], [beta I, 0]], an indefinite bi-invariant metric.
 
@@ -177,7 +177,7 @@ def semi_riemannian_metric_se3(alpha: float, beta: float) -> Array:
     return metric
 
 
-@described_by(returns="(..., 3, 3) or (..., 4, 4)")
+@described_by(returns="ndarray, shape (..., 3, 3) or (..., 4, 4)")
 def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     """Return the tangent vector X = A hat(x), the value at A of the left-invariant field of x.
 
@@ -200,7 +200,7 @@ def tangent_from_components(A: ArrayLike, x: ArrayLike) -> Array:
     return A @ (hat_so3(x) if size == 3 else hat_se3(x))
 
 
-@described_by(returns="(..., 3) or (..., 6)")
+@described_by(returns="ndarray, shape (..., 3) or (..., 6)")
 def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     """Return the components x = vee(A⁻¹ X) of tangent vectors X at A, using Rᵀ for R⁻¹.
 
@@ -225,7 +225,7 @@ def components_from_tangent(A: ArrayLike, X: ArrayLike) -> Array:
     return _components(A, X)
 
 
-@described_by(returns="(..., 3, 3)")
+@described_by(returns="ndarray, shape (..., 3, 3)")
 def inertia_from_weight(W: ArrayLike) -> Array:
     """Return tr(W) I − W, the matrix of the metric that tr(XᵀY W) induces on SO(3).
 
@@ -249,7 +249,7 @@ def inertia_from_weight(W: ArrayLike) -> Array:
     return np.trace(W, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - W
 
 
-@described_by(returns="(..., 3, 3)")
+@described_by(returns="ndarray, shape (..., 3, 3)")
 def weight_from_inertia(G: ArrayLike) -> Array:
     """Return the weight W = tr(G)/2 I − G, which satisfies tr(W) I − W = G.
 

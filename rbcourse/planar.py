@@ -49,7 +49,7 @@ Plan: TypeAlias = Iterable[tuple[ArrayLike, float]]
 Commands: TypeAlias = list[tuple[Array, float]]
 
 
-@described_by(__doc__, returns="(..., 3, 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
 def matrix_from_planar(pose: ArrayLike) -> Array:
     """Return the matrices [[cos θ, −sin θ, x], [sin θ, cos θ, y], [0, 0, 1]] of planar poses.
 
@@ -72,7 +72,7 @@ def matrix_from_planar(pose: ArrayLike) -> Array:
     return A
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def planar_from_matrix(A: ArrayLike) -> Array:
     """Return the planar poses (x, y, theta) of matrices, with −π ≤ theta ≤ π.
 
@@ -93,7 +93,7 @@ def planar_from_matrix(A: ArrayLike) -> Array:
     return np.concatenate([A[..., :2, 2], theta[..., None]], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     """Convert the pose `step` from the body frame of `pose` to the world frame.
 
@@ -111,7 +111,7 @@ def compose_planar(pose: ArrayLike, step: ArrayLike) -> Array:
     return np.concatenate([moved, (pose[..., 2] + step[..., 2])[..., None]], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def inverse_planar(pose: ArrayLike) -> Array:
     """Return the pose of the world in the body frame; composed with `pose`, it gives (0, 0, 0).
 
@@ -127,7 +127,7 @@ def inverse_planar(pose: ArrayLike) -> Array:
     return np.concatenate([-_rotated(back, pose[..., :2]), back[..., None]], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def exp_planar(S: ArrayLike) -> Array:
     """Return the pose to which the constant body twist S leads from (0, 0, 0) in unit time.
 
@@ -148,7 +148,7 @@ def exp_planar(S: ArrayLike) -> Array:
     return np.concatenate([chord, S[..., 2:]], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def log_planar(pose: ArrayLike) -> Array:
     """Return the body twist with −π ≤ omega ≤ π that leads from (0, 0, 0) to a pose in unit time.
 
@@ -168,7 +168,7 @@ def log_planar(pose: ArrayLike) -> Array:
     return np.concatenate([chord / sinc(turn / 2), turn], axis=-1)
 
 
-@described_by(__doc__, returns="(steps + 1, ..., 3)")
+@described_by(__doc__, returns="ndarray, shape (steps + 1, ..., 3)")
 def interpolate_planar(
     start: ArrayLike, goal: ArrayLike, steps: int = 10, *, shortest: bool = False
 ) -> Array:
@@ -202,7 +202,7 @@ def interpolate_planar(
     return interpolate(start, goal, steps)
 
 
-@described_by(__doc__, returns="(commands + 1, ..., 3)")
+@described_by(__doc__, returns="ndarray, shape (commands + 1, ..., 3)")
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
     """Return the poses, with full turns, at the start and after each command of a plan.
 

@@ -39,6 +39,7 @@ MANY = 20  # for this many matrices or more, FOAM is faster than the SVD
 NOT_UNIQUE = "the nearest rotation is not unique, the curve jumps here (see margin)"
 
 
+@described_by(returns="ndarray of bool, shape (...)")
 def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """Test whether matrices are rotations: MᵀM = I and det M = 1.
 
@@ -50,10 +51,6 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
         Matrices with non-finite entries give False and raise no error.
     atol : float, optional
         The largest accepted error of any entry of MᵀM − I and of det M − 1.
-
-    Returns
-    -------
-    ndarray of bool, shape (...)
 
     Examples
     --------
@@ -70,6 +67,7 @@ def is_so(M: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     return passes[()]
 
 
+@described_by(returns="ndarray of bool, shape (...)")
 def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """Test whether matrices are poses [[R, d], [0, 1]], with a rotation R and finite d.
 
@@ -81,10 +79,6 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
         Matrices with non-finite entries give False and raise no error.
     atol : float, optional
         The largest accepted error of R, as for `is_so`, and of the last row.
-
-    Returns
-    -------
-    ndarray of bool, shape (...)
 
     Examples
     --------
@@ -99,7 +93,7 @@ def is_se(A: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     return passes[()]
 
 
-@described_by(__doc__, returns="(..., n, n)")
+@described_by(__doc__, returns="ndarray, shape (..., n, n)")
 def project_so(M: ArrayLike) -> Array:
     """Return the rotation R nearest to M in the Frobenius norm: U diag(1, …, 1, det(U Vᵀ)) Vᵀ.
 
@@ -108,11 +102,6 @@ def project_so(M: ArrayLike) -> Array:
     reflection if det M < 0.
     Source: BK 4, BK Prop. 2, BK Prop. 3; RR 1.4, RR (4), RR (5), RR Fig. 1.
 
-    See Also
-    --------
-    rbcourse.textbook.project_so : A version in three lines, with the SVD.
-    distance_to_so : The distance of M from R.
-
     Notes
     -----
     Singular set: matrices M for which the two smallest eigenvalues of RᵀM sum to 0. Such matrices
@@ -120,6 +109,7 @@ def project_so(M: ArrayLike) -> Array:
     rotations are then equally near, and one of them is returned. Near this set, R is accurate to a
     few eps ‖M‖ divided by the sum of these eigenvalues. FOAM (see `rbcourse._foam`) projects large
     stacks of 3 × 3 matrices, except near the singular set; the SVD projects all others.
+    `rbcourse.textbook.project_so` is a version in three lines. See also `distance_to_so`.
 
     Examples
     --------
@@ -130,7 +120,7 @@ def project_so(M: ArrayLike) -> Array:
     return np.ascontiguousarray(nearest(as_array("M", M, "n", "n", copy=False))[0])
 
 
-@described_by(returns="(..., n, n)")
+@described_by(returns="ndarray, shape (..., n, n)")
 def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     """Return the rotation R that minimizes √tr(XᵀX W), where X = M − R: `project_so` of M W.
 
@@ -171,7 +161,7 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     return nearest(scaled(M) @ W)[0]
 
 
-@described_by(returns="(..., n, n)")
+@described_by(returns="ndarray, shape (..., n, n)")
 def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     """Orthonormalise the columns of M from left to right by the Gram–Schmidt method.
 
@@ -208,7 +198,7 @@ def orthonormalize_gram_schmidt(M: ArrayLike) -> Array:
     return Q
 
 
-@described_by(__doc__, returns="(...)")
+@described_by(__doc__, returns="ndarray, shape (...)")
 def distance_to_so(M: ArrayLike) -> Array:
     """Return the Frobenius norm ‖M − R‖ for the nearest rotation R: √Σ (σ_i − 1)².
 
@@ -272,7 +262,7 @@ def _rounding_left(M: Array, U: Array, d: Array, Vt: Array) -> Array:
     return turn
 
 
-@described_by(returns="(..., n + 1, n + 1)")
+@described_by(returns="ndarray, shape (..., n + 1, n + 1)")
 def project_se(B: ArrayLike) -> Array:
     """Return [[project_so(B1), B2], [0, 1]]: the pose nearest to B = [[B1, B2], [0, 1]].
 

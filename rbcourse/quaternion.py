@@ -66,7 +66,7 @@ __all__ = [
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
-@described_by(__doc__, returns="(..., 3, 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
 def matrix_from_quaternion(q: ArrayLike) -> Array:
     """Return the rotation matrix R of a unit quaternion; q and −q give the same matrix.
 
@@ -82,7 +82,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
     return matrix(np.moveaxis(as_unit_quaternions("q", q), -1, 0))
 
 
-@described_by(__doc__, returns="(..., 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4)")
 def quaternion_from_matrix(R: ArrayLike) -> Array:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix, with w ≥ 0.
 
@@ -99,7 +99,7 @@ def quaternion_from_matrix(R: ArrayLike) -> Array:
     return quaternion_of(as_rotations("R", R))
 
 
-@described_by(__doc__, returns="(..., 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4)")
 def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     """Return the quaternion (cos(a/2), sin(a/2) w/a) of the rotation by a = ‖w‖ about w.
 
@@ -116,7 +116,7 @@ def quaternion_from_rotation_vector(w: ArrayLike) -> Array:
     return np.concatenate([np.cos(angle / 2), np.sin(angle / 2) * axis], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     """Return the shortest rotation vector of a unit quaternion; q and −q give the same vector.
 
@@ -132,7 +132,7 @@ def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
     return rotation_vector_of(as_unit_quaternions("q", q))
 
 
-@described_by(__doc__, returns="(..., 3, 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
 def matrix_from_zyx(angles: ArrayLike) -> Array:
     """Return R_z(α) R_y(β) R_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
@@ -151,7 +151,7 @@ def matrix_from_zyx(angles: ArrayLike) -> Array:
     return _turn_about(2, alpha) @ _turn_about(1, beta) @ _turn_about(0, gamma)
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def zyx_from_matrix(R: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with R = R_z(α) R_y(β) R_x(γ), as `zyx_from_quaternion` does.
 
@@ -166,7 +166,7 @@ def zyx_from_matrix(R: ArrayLike) -> Array:
     return zyx_from_quaternion(quaternion_from_matrix(R))
 
 
-@described_by(__doc__, returns="(..., 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4)")
 def quaternion_from_zyx(angles: ArrayLike) -> Array:
     """Return q_z(α) q_y(β) q_x(γ) for angles (α, β, γ) of any size: yaw, pitch and roll.
 
@@ -187,7 +187,7 @@ def quaternion_from_zyx(angles: ArrayLike) -> Array:
     return np.stack([w, x, y, z], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def zyx_from_quaternion(q: ArrayLike) -> Array:
     """Return the angles (α, β, γ) with q = ± q_z(α) q_y(β) q_x(γ).
 
@@ -215,6 +215,7 @@ def zyx_from_quaternion(q: ArrayLike) -> Array:
     return np.stack([alpha, beta, gamma], axis=-1)
 
 
+@described_by(returns="ndarray of bool, shape (...)")
 def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     """Return whether quaternions have norm 1.
 
@@ -227,10 +228,6 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
     atol : float, optional
         The largest accepted difference of the norm from 1.
 
-    Returns
-    -------
-    ndarray of bool, shape (...)
-
     Examples
     --------
     >>> is_unit_quaternion([[0.6, 0, 0.8, 0], [1, 1, 0, 0]])
@@ -242,7 +239,7 @@ def is_unit_quaternion(q: ArrayLike, atol: float = 1e-9) -> NDArray[np.bool_]:
         return ((np.abs(norm - 1) <= atol) & np.isfinite(norm))[()]
 
 
-@described_by(returns="(..., 4)")
+@described_by(returns="ndarray, shape (..., 4)")
 def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     """Return Hamilton's product p q of quaternions (w, x, y, z): rotation by q, and then by p.
 
@@ -263,7 +260,7 @@ def quaternion_multiply(p: ArrayLike, q: ArrayLike) -> Array:
     return np.moveaxis(multiply(np.moveaxis(p, -1, 0), np.moveaxis(q, -1, 0)), 0, -1)
 
 
-@described_by(quaternion_multiply, returns="(..., 4)")
+@described_by(quaternion_multiply, returns="ndarray, shape (..., 4)")
 def quaternion_conjugate(q: ArrayLike) -> Array:
     """Return (w, −x, −y, −z), the inverse of a unit quaternion.
 
@@ -277,7 +274,7 @@ def quaternion_conjugate(q: ArrayLike) -> Array:
     return as_finite("q", q, 4) * _CONJUGATE + 0.0
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     """Return rotated points: the vector part of q p q⁻¹.
 
@@ -294,7 +291,7 @@ def rotate_by_quaternion(q: ArrayLike, p: ArrayLike) -> Array:
     return quaternion_multiply(quaternion_multiply(q, pure), quaternion_conjugate(q))[..., 1:]
 
 
-@described_by(returns="(..., 4)")
+@described_by(returns="ndarray, shape (..., 4)")
 def project_quaternion(q: ArrayLike) -> Array:
     """Return the unit quaternion nearest to q, which is q/‖q‖.
 
@@ -314,7 +311,7 @@ def project_quaternion(q: ArrayLike) -> Array:
     return as_unit("q", q, 4)
 
 
-@described_by(quaternion_multiply, returns="(..., 4)")
+@described_by(quaternion_multiply, returns="ndarray, shape (..., 4)")
 def canonical_quaternion(q: ArrayLike) -> Array:
     """Return q or −q, whichever has w ≥ 0: a unique quaternion for each rotation.
 
@@ -332,7 +329,7 @@ def canonical_quaternion(q: ArrayLike) -> Array:
     return canonical(as_finite("q", q, 4))
 
 
-@described_by(returns="(N, ..., 4) or (4,)")
+@described_by(returns="ndarray, shape (N, ..., 4) or (4,)")
 def continuous_quaternions(q: ArrayLike) -> Array:
     """Choose the signs of quaternions along a path so that each is near to the previous one.
 
@@ -359,7 +356,7 @@ def continuous_quaternions(q: ArrayLike) -> Array:
     return q + 0.0
 
 
-@described_by(returns="t.shape + (..., 4)")
+@described_by(returns="ndarray, shape t.shape + (..., 4)")
 def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the shorter arc from the rotation q0 to the rotation q1.
 
@@ -393,7 +390,7 @@ def slerp(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     return np.moveaxis(value, 0, -1)
 
 
-@described_by(slerp, returns="t.shape + (..., 4)")
+@described_by(slerp, returns="ndarray, shape t.shape + (..., 4)")
 def slerp_long(q0: ArrayLike, q1: ArrayLike, t: ArrayLike) -> Array:
     """Return the quaternions on the longer arc from the rotation q0 to the rotation q1.
 

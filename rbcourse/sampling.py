@@ -46,7 +46,7 @@ __all__ = [
 _HEIGHTS, _LONGITUDES = 4, 5  # cells of equal area; 5 of 100 rotations are expected in each
 
 
-@described_by(returns="(..., 3, 3)")
+@described_by(returns="ndarray, shape (..., 3, 3)")
 def arvo_rotation(x: ArrayLike) -> Array:
     """Return Arvo's rotation −M B for three numbers; uniform numbers give uniform rotations.
 
@@ -75,7 +75,7 @@ def arvo_rotation(x: ArrayLike) -> Array:
     return -M @ B
 
 
-@described_by(returns="(..., 4)")
+@described_by(returns="ndarray, shape (..., 4)")
 def shoemake_quaternion(x: ArrayLike) -> Array:
     """Return Shoemake's quaternion for three numbers; uniform numbers give uniform rotations.
 
@@ -101,7 +101,7 @@ def shoemake_quaternion(x: ArrayLike) -> Array:
     return np.stack([w, np.sin(theta1) * sigma1, np.cos(theta1) * sigma1, z], axis=-1)
 
 
-@described_by(__doc__, returns="size + (3, 3)")
+@described_by(__doc__, returns="ndarray, shape size + (3, 3)")
 def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random rotation matrices.
 
@@ -117,7 +117,7 @@ def sample_rotation(size: int | Sequence[int] | None = None, *, rng: Rng = None)
     return _in_blocks(_arvo, (3, 3), size, rng)
 
 
-@described_by(sample_rotation, returns="size + (4,)")
+@described_by(sample_rotation, returns="ndarray, shape size + (4,)")
 def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return uniformly random unit quaternions; q and −q are equally likely.
 
@@ -134,7 +134,7 @@ def sample_quaternion(size: int | Sequence[int] | None = None, *, rng: Rng = Non
     return _in_blocks(_shoemake, (4,), size, rng)
 
 
-@described_by(sample_rotation, returns="size + (3, 3)")
+@described_by(sample_rotation, returns="ndarray, shape size + (3, 3)")
 def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return R_z(α) R_y(β) R_x(γ) for angles uniform on [0, 2π); the rotations are not uniform.
 
@@ -149,7 +149,7 @@ def sample_rotation_naive(size: int | Sequence[int] | None = None, *, rng: Rng =
     return matrix_from_zyx(_three_angles(size, rng))
 
 
-@described_by(sample_rotation, returns="size + (4,)")
+@described_by(sample_rotation, returns="ndarray, shape size + (4,)")
 def sample_quaternion_naive(size: int | Sequence[int] | None = None, *, rng: Rng = None) -> Array:
     """Return q_z(γ) q_y(β) q_x(α) for angles uniform on [0, 2π); the quaternions are not uniform.
 
@@ -243,7 +243,7 @@ class UniformityTest(NamedTuple):
     null: str
 
 
-@described_by(__doc__, returns="(...)")
+@described_by(__doc__, returns="ndarray, shape (...)")
 def angle_law(angle: ArrayLike) -> Array:
     """Return the probability (a − sin a)/π that a uniform rotation turns by at most a.
 

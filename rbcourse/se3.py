@@ -41,7 +41,7 @@ from rbcourse.so3 import (
 )
 
 
-@described_by(__doc__, returns="(..., 4, 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4, 4)")
 def pose_from_components(R: ArrayLike, d: ArrayLike) -> Array:
     """Return the pose [[R, d], [0, 1]].
 
@@ -92,7 +92,7 @@ def join(R: Array, d: Array) -> Array:
     return A
 
 
-@described_by(__doc__, returns="(..., 4, 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4, 4)")
 def inverse_se3(A: ArrayLike) -> Array:
     """Return the inverse of a pose: [[Rᵀ, −Rᵀ d], [0, 1]].
 
@@ -109,7 +109,7 @@ def inverse_se3(A: ArrayLike) -> Array:
     return join(Rt, -matvec(Rt, d))
 
 
-@described_by(__doc__, returns="(..., 4, 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4, 4)")
 def pose_from_coordinates(x: ArrayLike) -> Array:
     """Return the pose with rotation exp_so3(σ) and position d, in the fixed frame.
 
@@ -126,7 +126,7 @@ def pose_from_coordinates(x: ArrayLike) -> Array:
     return join(exp_so3(x[..., :3]), x[..., 3:])
 
 
-@described_by(__doc__, returns="(..., 6)")
+@described_by(__doc__, returns="ndarray, shape (..., 6)")
 def coordinates_from_pose(A: ArrayLike) -> Array:
     """Return the coordinates (σ, d) of a pose: σ = log_so3(R), and d in the fixed frame.
 
@@ -142,7 +142,7 @@ def coordinates_from_pose(A: ArrayLike) -> Array:
     return np.concatenate([log(R), d], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 4, 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4, 4)")
 def hat_se3(S: ArrayLike) -> Array:
     """Return the matrix of a twist S = (ω, v): [[hat_so3(ω), v], [0, 0]].
 
@@ -162,7 +162,7 @@ def hat_se3(S: ArrayLike) -> Array:
     return matrix
 
 
-@described_by(__doc__, returns="(..., 6)")
+@described_by(__doc__, returns="ndarray, shape (..., 6)")
 def vee_se3(matrix: ArrayLike) -> Array:
     """Return the twist (ω, v) of a matrix [[ω̂, v], [0, 0]]: the inverse of `hat_se3`.
 
@@ -182,7 +182,7 @@ BASIS_SE3 = hat_se3(np.eye(6))
 BASIS_SE3.flags.writeable = False
 
 
-@described_by(__doc__, returns="(..., 4, 4)")
+@described_by(__doc__, returns="ndarray, shape (..., 4, 4)")
 def exp_se3(S: ArrayLike) -> Array:
     """Return the pose to which the constant twist S = (ω, v) leads from I in unit time.
 
@@ -205,7 +205,7 @@ def exp_se3(S: ArrayLike) -> Array:
     return join(exp_so3(w), matvec(left_jacobian, v))
 
 
-@described_by(__doc__, returns="(..., 6)")
+@described_by(__doc__, returns="ndarray, shape (..., 6)")
 def log_se3(A: ArrayLike) -> Array:
     """Return the twist (ω, v) with exp_se3((ω, v)) = A and ‖ω‖ ≤ π.
 
@@ -224,7 +224,7 @@ def log_se3(A: ArrayLike) -> Array:
     return np.concatenate([w, matvec(left_jacobian_inverse, d)], axis=-1)
 
 
-@described_by(__doc__, returns="(..., 6, 6)")
+@described_by(__doc__, returns="ndarray, shape (..., 6, 6)")
 def adjoint_se3(A: ArrayLike) -> Array:
     """Return [[R, 0], [d̂ R, R]], which maps twists from the body frame of A to the fixed frame.
 
@@ -244,7 +244,7 @@ def adjoint_se3(A: ArrayLike) -> Array:
     return Ad
 
 
-@described_by(__doc__, returns="(..., 6)")
+@described_by(__doc__, returns="ndarray, shape (..., 6)")
 def twist_from_rates(A: ArrayLike, w: ArrayLike, d_dot: ArrayLike) -> Array:
     """Return the twist (ω, Rᵀ ḋ) of a body from ω in the body frame and ḋ in the fixed frame.
 

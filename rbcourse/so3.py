@@ -42,7 +42,7 @@ def vee(W: Array) -> Array:
     return W.reshape(*W.shape[:-2], 9) @ (BASIS_SO3.reshape(3, 9).T / 2)
 
 
-@described_by(returns="(..., 3, 3)")
+@described_by(returns="ndarray, shape (..., 3, 3)")
 def hat_so3(w: ArrayLike) -> Array:
     """Return the skew-symmetric matrix of a vector: hat_so3(w) @ x = w × x.
 
@@ -63,7 +63,7 @@ def hat_so3(w: ArrayLike) -> Array:
     return hat(as_finite("w", w, 3))
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def vee_so3(W: ArrayLike) -> Array:
     """Return the vector of the skew-symmetric part (W − Wᵀ)/2: the inverse of `hat_so3`.
 
@@ -77,7 +77,7 @@ def vee_so3(W: ArrayLike) -> Array:
     return vee(as_finite("W", W, 3, 3))
 
 
-@described_by(__doc__, returns="(..., 3, 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
 def exp_so3(w: ArrayLike) -> Array:
     """Return the rotation by ‖w‖ about w: I + sin a n̂ + (1 − cos a) n̂² with a = ‖w‖ and n = w/a.
 
@@ -96,7 +96,7 @@ def exp_so3(w: ArrayLike) -> Array:
     return np.eye(3) + np.sin(angle) * N + 2 * np.sin(angle / 2) ** 2 * N @ N
 
 
-@described_by(__doc__, returns="(..., 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3)")
 def log_so3(R: ArrayLike) -> Array:
     """Return the shortest rotation vector w of R: exp_so3(w) = R and ‖w‖ ≤ π, up to rounding.
 
@@ -118,7 +118,7 @@ def log(R: Array) -> Array:
     return rotation_vector_of(quaternion_of(R))
 
 
-@described_by(__doc__, returns="(...)")
+@described_by(__doc__, returns="ndarray, shape (...)")
 def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     """Return the angle of the rotation from R to S: the geodesic distance ‖log_so3(Rᵀ S)‖.
 
@@ -135,7 +135,7 @@ def angle_between(R: ArrayLike, S: ArrayLike) -> Array:
     return np.linalg.norm(log(np.swapaxes(R, -1, -2) @ S), axis=-1)
 
 
-@described_by(__doc__, returns="(..., 3, 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
 def right_jacobian_so3(w: ArrayLike) -> Array:
     """Return the matrix J for which J w' is the body angular velocity along exp_so3(w(t)).
 
@@ -153,7 +153,7 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     return np.eye(3) - np.sin(angle / 2) * sinc(angle / 2) * N + (1 - sinc(angle)) * N @ N
 
 
-@described_by(__doc__, returns="(..., 3, 3)")
+@described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
 def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     """Return the inverse of `right_jacobian_so3`, which maps body angular velocities to w'.
 

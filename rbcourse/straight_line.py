@@ -24,7 +24,7 @@ __all__ = ["f", "line_singular_value", "theta"]
 _PI_REST = 1.2246467991473532e-16  # π − np.pi
 
 
-@described_by(__doc__, returns="(...)")
+@described_by(__doc__, returns="ndarray, shape (...)")
 def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     """Return s(t) for the line (1 − t) I + t R2, whose singular values are 1, s(t), s(t).
 
@@ -41,7 +41,7 @@ def line_singular_value(t: ArrayLike, angle: ArrayLike) -> Array:
     return singular_value(*_where_and_angle(as_finite("t", t), angle))
 
 
-@described_by(__doc__, returns="(...)")
+@described_by(__doc__, returns="ndarray, shape (...)")
 def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return θ(t), or a derivative, where exp(ω̂₀ θ(t)) is nearest to (1 − t) I + t exp(ω̂₀).
 
@@ -70,7 +70,7 @@ def theta(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     return theta_bend(t, angle, s) if order == 2 else theta_third(t, angle, s)
 
 
-@described_by(theta, returns="(...)")
+@described_by(theta, returns="ndarray, shape (...)")
 def f(t: ArrayLike, angle: ArrayLike, order: int = 0) -> Array:
     """Return the position f(t) for which the projection has constant speed, or a derivative.
 

@@ -150,10 +150,6 @@ def projected_cubic(
         `weight_from_inertia`). For poses, this is the ``rotation``, and the centre of mass moves on
         a cubic, which is its optimal path. The curve meets all boundary conditions exactly.
 
-    See Also
-    --------
-    rbcourse.textbook.projected_cubic : A short version for a single curve.
-
     Notes
     -----
     Singular set: times at which the two smallest eigenvalues of RᵀM sum to 0. The curve jumps at
@@ -167,7 +163,8 @@ def projected_cubic(
     The curve does not depend on the choice of frames: the ends L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 give
     the curve L R(t) Q (and the inertia Qᵀ G Q). The optimum is `minimum_acceleration`. If the
     excursion is multiplied by s, the relative excess over this optimum is multiplied by about s⁴.
-    For large excursions, the excess may be large.
+    For large excursions, the excess may be large. `rbcourse.textbook.projected_cubic` is a short
+    version for a single curve.
 
     Examples
     --------
