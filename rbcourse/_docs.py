@@ -49,12 +49,6 @@ def described_by(
     return complete
 
 
-def described_together(module_doc: str | None, *functions: Callable[..., Any]) -> None:
-    """Complete the docstrings of functions with entries in the docstring of their module."""
-    for one in functions:
-        described_by(module_doc)(one)
-
-
 def _described(docstring: str | None) -> dict[str, tuple[str, str]]:
     """Return the name as written, and the entry, of each parameter that a docstring describes."""
     found = next(_SECTION.finditer(cleandoc(docstring or "") + "\n"))

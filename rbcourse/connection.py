@@ -68,7 +68,7 @@ def structure_constants(basis: ArrayLike) -> Array:
     return np.ldexp(C.reshape(m, m, m), i + j - k)
 
 
-@described_by(returns="ndarray, shape (..., m, m, m)")
+@described_by(structure_constants, returns="ndarray, shape (..., m, m, m)")
 def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     """Return the Christoffel symbols Γ of a left-invariant metric in a left-invariant frame.
 
@@ -84,8 +84,6 @@ def christoffel(G: ArrayLike, basis: ArrayLike) -> Array:
     G : array_like, shape (..., m, m)
         The matrix of the metric in the frame. It is symmetric and nonsingular, but need not be
         definite.
-    basis : array_like, shape (m, n, n)
-        The frame L_1 … L_m at the identity, as for `structure_constants`.
 
     Examples
     --------

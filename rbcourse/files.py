@@ -199,23 +199,18 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     write_csv(file, [*names, DURATION], rows)
 
 
-@described_by(save_plan)
+@described_by(save_plan, returns="list of (ndarray, float)")
 def load_plan(file: File, kind: str) -> Commands:
     """Read a plan that `save_plan` or a spreadsheet wrote.
 
     A malformed file, or a plan of another kind, raises ValueError. The message names the line and
-    the reason.
+    the reason. The commands (velocity, duration) are as in the example of `save_plan`.
     Source: RR 3.2, RR 4.2.
 
     Parameters
     ----------
     file : str or Path
         A file of comma-separated values in UTF-8. The first line has the names of the columns.
-
-    Returns
-    -------
-    list of (ndarray, float)
-        Commands (velocity, duration), as in the example of `save_plan`.
     """
     lines = ((place, _cells(place, line)) for place, line in text_lines(file))
     place, header = next(lines, (f"{file}, line 1", []))

@@ -125,7 +125,11 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
     """Return the rotation R that minimizes √tr(XᵀX W), where X = M − R: `project_so` of M W.
 
     For a body with points p, tr(XᵀX W) is the sum of the squared distances between M p and R p,
-    weighted by mass. `rbcourse.metrics.weight_from_inertia` returns the W of a given metric.
+    weighted by mass. `rbcourse.metrics.weight_from_inertia` returns the W of a given metric. L M
+    projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L. On SO(3),
+    W induces the left-invariant metric tr(W) I − W, which is the inertia of the body. Singular set:
+    M W is in the singular set of `project_so`. A W of rank n − 1, as for a flat body, determines R
+    if M W has the same rank. A W of rank n − 2 or less, as for a thin rod, never determines R.
     Source: BK 4, for metrics that the paper leaves to a later publication.
 
     Parameters
@@ -134,14 +138,6 @@ def project_so_weighted(M: ArrayLike, W: ArrayLike) -> Array:
         W is symmetric (up to 1e-12 of the largest entry) and has no negative eigenvalues (up to a
         few eps of the largest). For a body, it is ∫ p pᵀ dm over its points p in the body frame. A
         scale factor of W does not matter.
-
-    Notes
-    -----
-    L M projects to L R for every rotation L; M L does *not* project to R L, unless L W = W L. On
-    SO(3), W induces the left-invariant metric tr(W) I − W, which is the inertia of the body.
-    Singular set: M W is in the singular set of `project_so`. A W of rank n − 1, as for a flat body,
-    determines R if M W has the same rank. A W of rank n − 2 or less, as for a thin rod, never
-    determines R.
 
     Examples
     --------

@@ -54,7 +54,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import Rng, as_count, as_generator, as_single, as_tolerance, as_unit
-from rbcourse._docs import described_together
+from rbcourse._docs import described_by
 from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
 from rbcourse.draw.animate import Animation, Update, animate
@@ -412,4 +412,5 @@ def _rotation_vector(rotation: ArrayLike) -> Array:
     raise ValueError("rotation: a rotation matrix (3, 3) or a unit quaternion (4,) is wanted")
 
 
-described_together(__doc__, *(globals()[name] for name in __all__))
+for _name in __all__:
+    described_by(__doc__)(globals()[_name])

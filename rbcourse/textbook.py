@@ -54,7 +54,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._docs import described_together
+from rbcourse._docs import described_by
 from rbcourse.curves.bezier import corrected_bezier
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
@@ -462,4 +462,5 @@ def fastest(turn: Array, inertia: Array, torque: float, cells: int) -> tuple[Arr
     return s, np.append(0, np.cumsum(2 * h / (rate[1:] + rate[:-1])))
 
 
-described_together(__doc__, *(globals()[name] for name in __all__))
+for _name in __all__:
+    described_by(__doc__)(globals()[_name])

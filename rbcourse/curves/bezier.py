@@ -37,7 +37,12 @@ def bezier(
 ) -> Curve:
     """Return the cubic Bézier curve with these ends, by de Casteljau's algorithm with geodesics.
 
-    The control points are R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1.
+    The control points are R0, R0 exp(ŵ0/3), R1 exp(−ŵ1/3), R1. Domain: ‖w0‖ and ‖w1‖ times the
+    duration are below 3π. Singular set: the two inner control points are a half-turn apart.
+    `log_so3` then chooses the geodesic between them. If `long` is True, equal inner control points
+    are also singular; then `long` has no effect. By the triangle inequality, no other leg can
+    become a half-turn. The curve does not depend on the choice of frames, and the ends R1, R0, −w1,
+    −w0 give the reversed curve.
     Source: BK 1, its references 3 to 5; for ``long``, beyond BK 10.
 
     Parameters
@@ -46,21 +51,9 @@ def bezier(
         Whether the middle leg turns the other way round. If the end velocities are large, this
         curve may cost less.
 
-    Notes
-    -----
-    Domain: ‖w0‖ and ‖w1‖ times the duration are below 3π. Singular set: the two inner control
-    points are a half-turn apart. `log_so3` then chooses the geodesic between them. If `long` is
-    True, equal inner control points are also singular; then `long` has no effect. By the triangle
-    inequality, no other leg can become a half-turn. The curve does not depend on the choice of
-    frames, and the ends R1, R0, −w1, −w0 give the reversed curve.
-
     Examples
     --------
-    >>> from rbcourse import exp_so3
-    >>> c = bezier(np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, 0], [0, 1, 0])
-    >>> c(1, 1).round(12) + 0.0
-    array([0., 1., 0.])
-    >>> from rbcourse import acceleration_cost
+    >>> from rbcourse import acceleration_cost, exp_so3
     >>> ends = np.eye(3), exp_so3([0, 0, 1.5]), [0, 0, -2.4], [0, 0, -2.4]
     >>> [float(acceleration_cost(bezier(*ends, long=k)).round(1)) for k in (False, True)]
     [365.0, 136.3]
@@ -82,17 +75,13 @@ def cumulative_bezier(
 ) -> Curve:
     """Return R0 exp(β₁ v̂₁) exp(β₂ v̂₂) exp(β₃ v̂₃), the cubic Bézier curve in cumulative form.
 
-    This curve is faster to evaluate than `bezier`.
-    The turns are v₁ = w0/3, v₃ = w1/3, and the shortest turn v₂ from R0 exp(ŵ0/3) to R1 exp(−ŵ1/3).
-    The weights are β₁ = 1 − (1 − t)³, β₂ = 3t² − 2t³, β₃ = t³. The curve has the given ends.
+    This curve is faster to evaluate than `bezier`. The turns are v₁ = w0/3, v₃ = w1/3, and the
+    shortest turn v₂ from R0 exp(ŵ0/3) to R1 exp(−ŵ1/3). The weights are β₁ = 1 − (1 − t)³, β₂ = 3t²
+    − 2t³, β₃ = t³. The curve has the given ends. Singular set: v₂ is a half-turn. `log_so3` then
+    chooses its axis. The curve itself is smooth everywhere. It does not depend on the choice of
+    frames, but the reversed ends do not give the reversed curve.
     Source: BK 1; M.-J. Kim, M.-S. Kim and S. Y. Shin, A general construction scheme for unit
     quaternion curves with simple high order derivatives, SIGGRAPH 1995.
-
-    Notes
-    -----
-    Singular set: v₂ is a half-turn. `log_so3` then chooses its axis. The curve itself is smooth
-    everywhere. It does not depend on the choice of frames, but the reversed ends do not give the
-    reversed curve.
 
     Examples
     --------

@@ -46,20 +46,17 @@ def exponential_cubic(
     """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a cubic in exponential coordinates.
 
     The cubic has σ(0) = 0, σ'(0) = w0, σ(1) = log_so3(R0ᵀ R1), and σ'(1) from
-    `right_jacobian_inverse_so3`.
+    `right_jacobian_inverse_so3`. Singular set: R0 and R1 are a half-turn apart. `log_so3` then
+    chooses σ(1). If R0 = R1, `long` has no effect. The curve itself is smooth everywhere. If both
+    velocities are along the geodesic, the curve is the optimum among all curves that turn by σ(1).
+    The curve does not depend on the choice of frames, but the reversed ends do not give the
+    reversed curve.
     Source: BK 1, its reference 13; for ``long``, beyond BK 10.
 
     Parameters
     ----------
     long : bool, optional
         Whether the curve turns the other way round, by 2π − ‖log_so3(R0ᵀ R1)‖.
-
-    Notes
-    -----
-    Singular set: R0 and R1 are a half-turn apart. `log_so3` then chooses σ(1). If R0 = R1, `long`
-    has no effect. The curve itself is smooth everywhere. If both velocities are along the geodesic,
-    the curve is the optimum among all curves that turn by σ(1). The curve does not depend on the
-    choice of frames, but the reversed ends do not give the reversed curve.
 
     Examples
     --------
@@ -133,16 +130,12 @@ def cayley_cubic(
     """Return the cubic with these ends in Cayley parameters about R0.
 
     The quaternion of the curve is (1, g), divided by its norm. The Cayley parameters of a turn by
-    the angle a about the unit vector n are g = tan(a/2) n. Along a curve, 2 g' = w + g × w +
-    (g·w) g.
+    the angle a about the unit vector n are g = tan(a/2) n. Along a curve,
+    2 g' = w + g × w + (g·w) g. Singular set: half-turns, which have no Cayley parameters. No Cayley
+    cubic passes through a half-turn from R0. As R1 approaches a half-turn, the curve therefore
+    becomes long, and its cost grows without bound. The curve does not depend on the choice of
+    frames, but the reversed ends do not give the reversed curve.
     Source: BK 1, its reference 8.
-
-    Notes
-    -----
-    Singular set: half-turns, which have no Cayley parameters. No Cayley cubic passes through a
-    half-turn from R0. As R1 approaches a half-turn, the curve therefore becomes long, and its cost
-    grows without bound. The curve does not depend on the choice of frames, but the reversed ends do
-    not give the reversed curve.
 
     Examples
     --------
@@ -238,14 +231,10 @@ def exponential_quintic(
     """Return R0 exp(σ̂(t)) with these ends, where σ(t) is a quintic.
 
     The quintic has σ(0) = 0, σ(1) = log_so3(R0ᵀ R1) and the derivatives that give w and w' at both
-    ends.
+    ends. For small excursions, the curve is near-optimal for minimum jerk (see
+    docs/near_optimal.md). From rest to rest, it is the optimum (`minimum_jerk`). The singular set
+    is that of `exponential_cubic`, and the curve does not depend on the choice of frames.
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
-
-    Notes
-    -----
-    For small excursions, the curve is near-optimal for minimum jerk (see docs/near_optimal.md).
-    From rest to rest, it is the optimum (`minimum_jerk`). The singular set is that of
-    `exponential_cubic`, and the curve does not depend on the choice of frames.
 
     Examples
     --------

@@ -160,20 +160,12 @@ class Curve:
         values = self.evaluate(times.reshape(-1, 1), order)
         return values.reshape(times.shape + self.batch_shape + self._core(order))
 
-    @described_by(__call__)
+    @described_by(__call__, returns="State")
     def state(self, t: ArrayLike) -> State:
         """Return the pose (or rotation), the velocity and the acceleration, in one pass.
 
-        Parameters
-        ----------
-        t : array_like, shape t.shape
-            Times in the domain. A controller whose last time is after the end of the curve uses
-            ``min(t, c.domain[1])``.
-
-        Returns
-        -------
-        State
-            The ``pose``, ``velocity`` and ``acceleration``: ``c(t)``, ``c(t, 1)`` and ``c(t, 2)``.
+        The fields ``pose``, ``velocity``, ``acceleration`` are ``c(t)``, ``c(t, 1)``, ``c(t, 2)``. A
+        controller whose last time is after the end of the curve uses ``min(t, c.domain[1])``.
 
         Examples
         --------

@@ -40,7 +40,10 @@ def geodesic(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) ->
     For rotations, it is R0 exp(σ̂ t) with constant angular velocity; its attribute
     ``rotation_vector`` is σ = log_so3(R0ᵀ R1), with ‖σ‖ ≤ π. For poses, its ``rotation`` is this
     curve, and the origin moves on a straight line at constant speed. The angular velocity and d'
-    are constant, but v = Rᵀ d' is not.
+    are constant, but v = Rᵀ d' is not. Singular set: start and goal are a half-turn apart. Two
+    geodesics are then shortest. In the ``rotation_vector`` of the returned geodesic, the component
+    of largest magnitude (the first, if several are equal) is positive. For poses, `screw` is a
+    geodesic of another metric.
     Source: BK 6.1; for poses, BK 2.6, BK (14).
 
     Parameters
@@ -49,12 +52,6 @@ def geodesic(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) ->
         Rotation matrices, or poses.
     duration : array_like, shape (...), optional
         The duration of the motion.
-
-    Notes
-    -----
-    Singular set: start and goal are a half-turn apart. Two geodesics are then shortest. In the
-    ``rotation_vector`` of the returned geodesic, the component of largest magnitude (the first, if
-    several are equal) is positive. For poses, `screw` is a geodesic of another metric.
 
     Examples
     --------
@@ -342,20 +339,17 @@ class ScrewMotion(Curve):
 def screw_from_pose(A: ArrayLike) -> Screw:
     """Return the screw of a displacement in the fixed frame: axis, point, angle and slide.
 
-    The screw also has the ``pitch``, the slide per radian of the turn.
+    The screw also has the ``pitch``, the slide per radian of the turn. Singular set: half-turns,
+    which have two screws (`log_so3` chooses the axis), and poses without a turn, which have no
+    unique axis. A turn by less than 8 eps counts as a pure slide. For small angles, axis, slide and
+    pitch have a relative error of a few eps divided by the angle. The point is then far away, and
+    its error is a few eps ‖d‖ divided by the square of the angle.
     Source: BK 2.6.
 
     Parameters
     ----------
     A : array_like, shape (..., 4, 4)
         Poses. For the screw in the fixed frame that takes A0 to A1, use A1 @ inverse_se3(A0).
-
-    Notes
-    -----
-    Singular set: half-turns, which have two screws (`log_so3` chooses the axis), and poses without
-    a turn, which have no unique axis. A turn by less than 8 eps counts as a pure slide. For small
-    angles, axis, slide and pitch have a relative error of a few eps divided by the angle. The point
-    is then far away, and its error is a few eps ‖d‖ divided by the square of the angle.
 
     Examples
     --------

@@ -114,6 +114,7 @@ class ProjectedPolynomial(Curve):
         return near_margins(super().breakpoints, *doubtful._least_gap)
 
 
+@described_by(returns="Curve")
 def projected_cubic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -125,6 +126,11 @@ def projected_cubic(
 ) -> Curve:
     """Return the projected cubic with these ends, which is near-optimal for minimum acceleration.
 
+    The curve has the attribute ``margin``. For rotations, it consists of the nearest rotations to
+    the cubic M(t) that has the values R and the derivatives R ŵ at both ends; for a body, they are
+    nearest in its metric (`project_so_weighted`, with the weight of `weight_from_inertia`). For
+    poses, this is the ``rotation``, and the centre of mass moves on a cubic, which is its optimal
+    path. The curve meets all boundary conditions exactly.
     Source: BK 6.2, BK 6.3, BK Prop. 3, BK Prop. 5; with M'(1) where the paper prints the second
     derivative. For other bodies than a ball, beyond BK 6.
 
@@ -140,15 +146,6 @@ def projected_cubic(
         the sum of the other two, as for every real body.
     duration : array_like, shape (...), optional
         The duration of the motion; velocities are per unit of this time.
-
-    Returns
-    -------
-    Curve
-        A curve with the attribute ``margin``. For rotations, it consists of the nearest rotations
-        to the cubic M(t) that has the values R and the derivatives R ŵ at both ends; for a body,
-        they are nearest in its metric (`project_so_weighted`, with the weight of
-        `weight_from_inertia`). For poses, this is the ``rotation``, and the centre of mass moves on
-        a cubic, which is its optimal path. The curve meets all boundary conditions exactly.
 
     Notes
     -----
@@ -203,6 +200,10 @@ def projected_quintic(
     The curve has the attribute ``margin``. For rotations, it consists of the nearest rotations to
     the quintic M(t) that has the values R, the first derivatives R ŵ and the second derivatives
     R (ŵ² + â) at both ends. For poses, this is the ``rotation``, and the origin moves on a quintic.
+    In general, this curve is not near the curve of least jerk, `minimum_jerk`. From rest to rest,
+    it costs 1.17 times the optimum for a turn by 60°, and 11.6 times the optimum for 120°.
+    `closed_forms.exponential_quintic` is near the optimum. The singular set and the symmetries are
+    as for `projected_cubic`.
     Source: BK 6, BK Prop. 3.
 
     Parameters
@@ -210,13 +211,6 @@ def projected_quintic(
     a0, a1 : array_like, shape (..., 3) or (..., 6), optional
         Accelerations at both ends as ``c(t, 2)`` returns them: w', or (w', Rᵀ d''), per unit time
         squared. The default is 0.
-
-    Notes
-    -----
-    In general, this curve is not near the curve of least jerk, `minimum_jerk`. From rest to rest,
-    it costs 1.17 times the optimum for a turn by 60°, and 11.6 times the optimum for 120°.
-    `closed_forms.exponential_quintic` is near the optimum. The singular set and the symmetries are
-    as for `projected_cubic`.
 
     Examples
     --------
