@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import cache
 from inspect import cleandoc, signature
 from itertools import groupby
 from operator import itemgetter
@@ -16,7 +17,7 @@ from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _SECTION = re.compile(
-    r"(?:^Parameters\n-+\n(.*?))?(?=^\S[^\n]*\n-{3,}\n|\Z)", re.MULTILINE | re.DOTALL
+    r"^(?:Parameters\n-+\n(.*?))?(?=^\S[^\n]*\n-{3,}\n|\Z)", re.MULTILINE | re.DOTALL
 )
 _ENTRY = re.compile(r"^(\S[^\n]*)\n((?:[ ]+[^\n]*\n|\n)*)", re.MULTILINE)
 
@@ -49,6 +50,7 @@ def described_by(
     return complete
 
 
+@cache
 def _described(docstring: str | None) -> dict[str, tuple[str, str]]:
     """Return the name as written, and the entry, of each parameter that a docstring describes."""
     found = next(_SECTION.finditer(cleandoc(docstring or "") + "\n"))
