@@ -25,7 +25,13 @@ from rbcourse.quaternion import (
 )
 from rbcourse.se3 import check_path, join
 
-__all__ = ["load_plan", "read_path", "replace_file", "save_plan", "write_path"]
+__all__ = [
+    "load_plan",
+    "read_path",
+    "replace_file",
+    "save_plan",
+    "write_path",
+]
 
 Lines: TypeAlias = list[tuple[str, str]]
 File: TypeAlias = str | os.PathLike[str]

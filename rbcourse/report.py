@@ -337,7 +337,6 @@ def interpolate_arm(start: ArrayLike, goal: ArrayLike, *, steps: int = 10) -> Ar
 def forward_propagate_arm(start_pose: ArrayLike, plan: Plan) -> Array:
     """Return the path of an arm that follows a plan, shape (commands + 1, n).
 
-    `start_pose` is the report's name for the joint angles at the start.
     Source: RR 4.2, RR (22), RR (23).
 
     Examples

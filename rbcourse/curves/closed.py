@@ -83,19 +83,15 @@ def quaternion_cubic(
 
     The cubic has q' = q (0, w)/2 at its ends. It ends at q1 or −q1, whichever is nearer to q0. If
     ‖w0‖ and ‖w1‖ are below 8 / duration, the curve turns the short way; for faster ends, it can
-    turn by two more full turns. The curve has a ``margin``.
+    turn by two more full turns. The curve has a ``margin``. Singular set: R0 and R1 are a half-turn
+    apart. The `canonical_quaternion` of R0ᵀ R1 is then used. The curve is also singular at times at
+    which the cubic is zero; a call at such a time raises ValueError. With k the larger of ‖w0‖ and
+    ‖w1‖ and a the angle between R0 and R1, ``margin`` is at least cos(a/4) − (k duration/8)
+    sin(a/4). If ``margin`` is small, the body turns by up to a full turn in a short time. The error
+    of the curve is then about eps divided by ``margin``. The errors of its first two derivatives
+    are about eps divided by the square and the cube of ``margin``. The curve does not depend on the
+    choice of frames, and the ends R1, R0, −w1, −w0 give the reversed curve.
     Source: BK 1, its references 6 and 7; BK Remark 7.
-
-    Notes
-    -----
-    Singular set: R0 and R1 are a half-turn apart. The `canonical_quaternion` of R0ᵀ R1 is then
-    used. The curve is also singular at times at which the cubic is zero; a call at such a time
-    raises ValueError. With k the larger of ‖w0‖ and ‖w1‖ and a the angle between R0 and R1,
-    ``margin`` is at least cos(a/4) − (k duration/8) sin(a/4). If ``margin`` is small, the body
-    turns by up to a full turn in a short time. The error of the curve is then about eps divided by
-    ``margin``. The errors of its first two derivatives are about eps divided by the square and the
-    cube of ``margin``. The curve does not depend on the choice of frames, and the ends R1, R0, −w1,
-    −w0 give the reversed curve.
 
     Examples
     --------

@@ -245,7 +245,12 @@ def projected_line(
     """Return the projection of the line R0 + (R1 − R0) f(t) on SO(3): R0 exp(σ̂ θ(f(t))).
 
     The curve has the attribute ``margin``. For poses, the origin moves on a straight line at
-    constant speed.
+    constant speed. Singular set: the rotations are a half-turn apart. At f(t) = 1/2, the projection
+    then jumps from R0 to R1, and a call of the curve raises ValueError. The computed ``margin`` is
+    accurate to a few eps; a ``margin`` below 1e-6 gives a RuntimeWarning. The projection is
+    accurate to eps divided by the sum of the two smallest eigenvalues of RᵀM. This sum is at least
+    ``margin``. A call of the curve also raises ValueError if `f` returns non-finite values or an
+    array of the wrong shape.
     Source: BK Prop. 6, BK Cor. 1, BK Cor. 2, BK (15), BK (16).
 
     Parameters
@@ -255,15 +260,6 @@ def projected_line(
         f(1) = 1 up to 1e-12. For orders 1 and 2, it returns the derivatives. The jerk ``c(t, 3)``
         also needs order 3. The times are from 0 to 1 and have an axis of length 1 for each batch
         axis. By default f(t) = t.
-
-    Notes
-    -----
-    Singular set: the rotations are a half-turn apart. At f(t) = 1/2, the projection then jumps from
-    R0 to R1, and a call of the curve raises ValueError. The computed ``margin`` is accurate to a
-    few eps; a ``margin`` below 1e-6 gives a RuntimeWarning. The projection is accurate to eps
-    divided by the sum of the two smallest eigenvalues of RᵀM. This sum is at least ``margin``. A
-    call of the curve also raises ValueError if `f` returns non-finite values or an array of the
-    wrong shape.
 
     Examples
     --------
