@@ -45,8 +45,8 @@ def module(name: str, root: Path) -> dict[str, Any]:
     """Return the names, the summary and the public members of a module.
 
     Names that `rbcourse` exports come first, and constants last. The public members are the names
-    in ``__all__``; without ``__all__``, they are the exported names and the classes of their
-    results; without exported names, all definitions.
+    in ``__all__`` and the exported names; without ``__all__``, they are the exported names and the
+    classes of their results; without exported names, all definitions.
     """
     tree = _parsed(name, root)
     about = (ast.get_docstring(tree) or "").partition("\n")[0]
@@ -57,7 +57,7 @@ def module(name: str, root: Path) -> dict[str, Any]:
         for home, names in _imported(tree).items():
             kinds = _public(_parsed(home, root)) if listed.intersection(names) else {}
             homes |= {each: (kinds[each][0], home) for each in names if each in listed & {*kinds}}
-        shown = listed
+        shown = listed | {*exported}
     elif shown := defined.keys() & exported:
         shown |= {result for each in shown for result in _results(defined[each][1])} & {*defined}
     else:

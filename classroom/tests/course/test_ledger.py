@@ -23,7 +23,7 @@ def test_the_stored_ledger_is_up_to_date_and_legible(found):
     assert ledger.render(found) == PAGE
     entries = PAGE.partition("## Misprints")[0].splitlines()
     assert max(map(len, entries)) <= 165
-    modules = "curves.projected_line, straight_line, explorers"
+    modules = "curves.geodesics, straight_line, explorers"
     assert f"| BK (16) | the angle θ(t) | {modules} | 06 |" in entries
 
 
