@@ -257,7 +257,7 @@ def joined(rotation: Curve, position: Position) -> Curve:
 
 
 def _check_position(position: Position, domain: tuple[float, float]) -> None:
-    """Refuse what is not called as position(t, order), and a SciPy spline that is not smooth."""
+    """Refuse an object without the call position(t, order), and a spline with corners."""
     wanted = "position: a callable position(t, order) is wanted, such as a CubicSpline"
     if not callable(position):
         raise ValueError(f"{wanted}, got {type(position).__name__}")
