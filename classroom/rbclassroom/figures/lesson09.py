@@ -37,7 +37,7 @@ def draw_comparison(fig: Figure, data: Table) -> None:
     space: Any = {"a": {"projection": "3d"}}
     axes: Any = fig.subplot_mosaic("ab;ac", per_subplot_kw=space, height_ratios=[3, 2])
     t, sigma = data["t [1]"], vectors(_SIGMA, data, "123")
-    sigma = {name: x.round(12) for name, x in sigma.items()}  # the same pixels on every processor
+    sigma = {name: x.round(14) for name, x in sigma.items()}  # the same pixels on every processor
     _draw_paths(axes["a"], sigma)
     for name, style in _STYLES.items():
         for axis, part in zip("xyz", sigma[name].T, strict=True):
