@@ -57,7 +57,6 @@ def _described(docstring: str | None) -> dict[str, tuple[str, str]]:
     return {
         name.strip(" *"): (name.strip(), f"{colon}{kind}\n{text.rstrip()}\n")
         for head, text in _ENTRY.findall(found[1] or "")
-        if not text.lstrip().startswith("As for ")
         for names, colon, kind in [head.partition(" : ")]
         for name in names.split(",")
     }

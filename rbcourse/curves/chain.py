@@ -128,11 +128,6 @@ def projected_spline(
 
     Source: BK Prop. 3, BK 6.3; beyond BK 13, beyond BK 14.
 
-    Parameters
-    ----------
-    times, poses, ends, rest_at, body
-        As for `spline_velocities`.
-
     Returns
     -------
     Chain
@@ -168,11 +163,6 @@ def quaternion_spline(times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natu
     the angle of a leg in rad. A leg of duration h turns the short way if h ‖ω‖ is below 8 at both
     ends. Moved poses, reversed times and singular set: as for `projected_spline`.
     Source: beyond BK 13, beyond BK 14.
-
-    Parameters
-    ----------
-    times, poses, ends
-        As for `spline_velocities`.
 
     Returns
     -------

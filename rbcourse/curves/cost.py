@@ -87,11 +87,6 @@ def acceleration_cost_parts(
 
     Source: BK (18); for other inertias, beyond BK 1.
 
-    Parameters
-    ----------
-    curve, body, rtol
-        As for `acceleration_cost`.
-
     Returns
     -------
     rotation, translation : ndarray, shape curve.batch_shape
@@ -126,11 +121,6 @@ def torque_cost(curve: Curve, *, body: Body | None = None, rtol: float = 1e-10) 
     The errors and the accuracy are those of `acceleration_cost`.
     Source: beyond BK 4.
 
-    Parameters
-    ----------
-    curve, body, rtol
-        As for `acceleration_cost`.
-
     Returns
     -------
     ndarray, shape curve.batch_shape
@@ -156,11 +146,6 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     SO(3). The errors and the accuracy are those of `acceleration_cost`; an error is also raised if
     the acceleration of a `chain` jumps.
     Source: beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
-
-    Parameters
-    ----------
-    curve, rtol
-        As for `acceleration_cost`.
 
     Returns
     -------

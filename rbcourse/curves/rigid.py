@@ -21,7 +21,30 @@ Position = Callable[..., ArrayLike]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class RigidMotion(Curve):
+class _WithRotation(Curve):
+    """A `Curve` on SE(3) that has the margin and the breakpoints of its rotation."""
+
+    rotation: Curve
+
+    size = 4
+
+    @property
+    def margin(self) -> Array:
+        """The margin of the rotation."""
+        return self.rotation.margin
+
+    @property
+    def breakpoints(self) -> Array:
+        """The `Curve.breakpoints` of the rotation."""
+        return self.rotation.breakpoints
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the same motion with another duration."""
+        return replace(self, duration=duration, rotation=self.rotation.lasting(duration))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class RigidMotion(_WithRotation):
     """A `Curve` on SE(3): a rotation R(t), and a polynomial path of the body's centre of mass.
 
     Source: BK 6.3.
@@ -35,10 +58,7 @@ class RigidMotion(Curve):
         1.
     """
 
-    rotation: Curve
     path: Array
-
-    size = 4
 
     def values(self, t: Array, order: int) -> Array:
         """Return the pose, or (w, Rᵀ d'), or (w', Rᵀ d''), where d is the origin's position."""
@@ -58,20 +78,6 @@ class RigidMotion(Curve):
     def _terms(self) -> Array:
         """The terms of the path, shape (n + 1, 3, count)."""
         return stack_terms(self.path)
-
-    @property
-    def margin(self) -> Array:
-        """The margin of the rotation."""
-        return self.rotation.margin
-
-    @property
-    def breakpoints(self) -> Array:
-        """The `Curve.breakpoints` of the rotation."""
-        return self.rotation.breakpoints
-
-    def lasting(self, duration: Array) -> Self:
-        """Return the same motion with another duration."""
-        return replace(self, duration=duration, rotation=self.rotation.lasting(duration))
 
 
 def _of_rotation_and_path(r: Array, R: Array, rates: list[Array], path: Array, order: int) -> Array:
@@ -105,18 +111,15 @@ def moving(given: Given, rotation: Curve) -> Curve:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Joined(Curve):
+class Joined(_WithRotation):
     """A rotation, and a path of the origin that a function gives.
 
     The function is called as ``position(first + t * span, order)``, where t is from 0 to 1.
     """
 
-    rotation: Curve
     position: Position
     first: Array
     span: Array
-
-    size = 4
 
     def values(self, t: Array, order: int) -> Array:
         """Return the pose, or (w, Rᵀ d'), or (w', Rᵀ d'')."""
@@ -131,17 +134,3 @@ class Joined(Curve):
             raise ValueError(f"{name}: shape {shape} is wanted, got {found.shape}")
         check_all(np.isfinite(found), name, found, "a finite number")
         return found.reshape(*t.shape, 3)
-
-    @property
-    def margin(self) -> Array:
-        """The margin of the rotation."""
-        return self.rotation.margin
-
-    @property
-    def breakpoints(self) -> Array:
-        """The `Curve.breakpoints` of the rotation."""
-        return self.rotation.breakpoints
-
-    def lasting(self, duration: Array) -> Self:
-        """Return the same motion with another duration."""
-        return replace(self, duration=duration, rotation=self.rotation.lasting(duration))

@@ -144,8 +144,6 @@ def limits_used(
     ----------
     curve : Curve
         A single curve.
-    body, **limits
-        As for `fastest`.
 
     Returns
     -------

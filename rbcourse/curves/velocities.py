@@ -262,11 +262,6 @@ def bessel_velocities(times: ArrayLike, poses: ArrayLike) -> Array:
     excess of the cost over the optimum is 14 to 15 %, however small the steps are. For samples of a
     smooth motion, doubling their number divides the excess by 4.
 
-    Parameters
-    ----------
-    times, poses
-        As for `spline_velocities`.
-
     Returns
     -------
     ndarray, shape (N, 6) or (N, 3)

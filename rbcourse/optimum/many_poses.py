@@ -48,8 +48,6 @@ def minimum_acceleration_spline(
 
     Parameters
     ----------
-    times, poses, ends
-        As for `spline_velocities`.
     body : Body, optional
         The body that moves, by default the ball of metrics (12) and (14).
     long : array_like of bool, shape (N − 1,), optional
@@ -126,16 +124,10 @@ def minimum_torque_spline(
 
     Parameters
     ----------
-    times
-        As for `spline_velocities`.
     poses : array_like, shape (N, 3, 3)
         A rotation matrix for each of the times.
-    ends
-        As for `spline_velocities`.
     body : Body
         The body that moves.
-    long
-        As for `minimum_acceleration_spline`.
 
     Returns
     -------
@@ -165,8 +157,6 @@ def minimum_jerk_spline(
 
     Parameters
     ----------
-    times
-        As for `spline_velocities`.
     poses : array_like, shape (N, 3, 3)
         A rotation matrix for each of the times.
     ends : {"natural", "rest", "periodic"} or pair of array_like, optional
@@ -174,8 +164,6 @@ def minimum_jerk_spline(
         acceleration are 0 at both ends. "periodic": they are the same at both ends. A pair gives
         the first and the last velocity, followed by the acceleration, in arrays of shape (6,). None
         in a pair means a natural end.
-    long
-        As for `minimum_acceleration_spline`.
 
     Returns
     -------

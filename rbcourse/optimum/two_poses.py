@@ -123,8 +123,6 @@ def minimum_torque(
         The angular velocities at both ends in the body frame. The default is rest.
     body : Body
         The body that moves: one for all problems of a stack, or one for each problem.
-    duration
-        As for `minimum_acceleration`.
 
     Returns
     -------
@@ -181,8 +179,6 @@ def minimum_jerk(
         Rotation matrices.
     v0, v1, a0, a1 : array_like, shape (..., 3), optional
         The angular velocities w and accelerations w' at both ends in the body frame, by default 0.
-    duration
-        As for `minimum_acceleration`.
 
     Returns
     -------
