@@ -1,22 +1,37 @@
-"""Paths and plans in files: CSV with column names and units, or TUM trajectories."""
+"""Paths and plans in files: recordings of poses in many formats, CSV and TUM, and plans as CSV."""
 
 from __future__ import annotations
 
-import csv
-import io
 import os
-import re
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Sequence
 from contextlib import suppress
-from typing import TypeAlias
+from decimal import Decimal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rbcourse._checks import as_single
 from rbcourse._docs import described_by
-from rbcourse._numerics import Array
+from rbcourse._numerics import Array, blocks
+from rbcourse._recordings import (
+    DIGITS,
+    EXACT,
+    FORMATS,
+    POSITION,
+    QUATERNION,
+    VELOCITIES,
+    File,
+    Recording,
+    read_recording,
+    split_line,
+    text_lines,
+    to_number,
+)
+from rbcourse.curves.curve import Curve
 from rbcourse.planar import Commands, Plan, as_command, as_plan
+from rbcourse.projection import is_so, project_so
 from rbcourse.quaternion import (
     continuous_quaternions,
     matrix_from_quaternion,
@@ -33,54 +48,50 @@ __all__ = [
     "write_path",
 ]
 
-Lines: TypeAlias = list[tuple[str, str]]
-File: TypeAlias = str | os.PathLike[str]
-TIME = ["time [s]"]
-POSITION = ["x [m]", "y [m]", "z [m]"]
-QUATERNION = ["qw [1]", "qx [1]", "qy [1]", "qz [1]"]
-TURNING = ["wx body [rad/s]", "wy body [rad/s]", "wz body [rad/s]"]
-MOVING = ["vx body [m/s]", "vy body [m/s]", "vz body [m/s]"]
-HEADERS = {
-    (moves, rates): TIME + POSITION * moves + QUATERNION + (TURNING + MOVING * moves) * rates
-    for moves in (True, False)
-    for rates in (True, False)
-}
-"""The columns of a CSV file of poses or of rotations, with or without velocities."""
-TUM = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
-"""The columns of a TUM trajectory. Its quaternions end with the scalar part; ours begin with it."""
-VELOCITIES = {
+Skip: TypeAlias = Literal["repeated", "nan", "unordered"]
+HEADER = ["time [s]", "x [m]", "y [m]", "z [m]", "qw [1]", "qx [1]", "qy [1]", "qz [1]"]
+ACCELERATIONS = [
+    *(f"alpha{axis} body [rad/s^2]" for axis in "xyz"),
+    *(f"a{axis} body [m/s^2]" for axis in "xyz"),
+]
+PLANAR = {
     "world": ["vx world [m/s]", "vy world [m/s]", "vtheta [rad/s]"],
     "body": ["vx body [m/s]", "vy body [m/s]", "vtheta [rad/s]"],
 }
 """The columns of a planar plan before the duration, for each frame."""
 DURATION = "duration [s]"
-_TOLERANCE = 1e-3  # of quaternion norms; some programs write only four decimals
-_PLAIN = re.compile(r"[-+.,eE\d \t\n]*", re.ASCII)
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_TOLERANCE = 1e-3  # of quaternion norms and of RᵀR; some programs write only four decimals
 
 
 def write_path(
-    file: File, times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
+    file: File,
+    times: ArrayLike,
+    path: Curve | ArrayLike,
+    velocities: ArrayLike | None = None,
+    accelerations: ArrayLike | None = None,
 ) -> None:
-    """Write a path of poses or rotations; the file extension selects CSV or TUM.
+    """Write a motion or a path of poses or rotations; the file extension selects CSV or TUM.
 
-    The first line has the names of the columns. In CSV, the names have units; in TUM, the line is a
-    comment. Each further line has a time, position, quaternion, ω and v. Quaternions are (w, x, y,
-    z) in CSV and (x, y, z, w) in TUM. The first quaternion has w ≥ 0. The signs of the others are
-    chosen so that each quaternion is near the previous one. Numbers are written with all digits. An
-    existing file is replaced. If an argument is malformed, nothing is written.
+    The first line has the names of the columns. In CSV, the names have units: time, position,
+    quaternion (w, x, y, z), and, if they are known, ω and v, ω' and Rᵀ d'', all in the body frame.
+    In TUM, the line is a comment, and each line has a time, position and quaternion (x, y, z, w).
+    The first quaternion has w ≥ 0. The signs of the others are chosen so that each quaternion is
+    near the previous one. Numbers are written with all digits. An existing file is replaced at
+    once. If an argument is malformed, nothing is written.
 
     Parameters
     ----------
     file : str or Path
-        The file name ends in ``.csv``, or for TUM (poses without velocities) in ``.tum`` or
-        ``.txt``.
+        The file name ends in ``.csv``, or for TUM (poses only) in ``.tum`` or ``.txt``.
     times : array_like, shape (N,)
         Increasing times in s.
-    poses : array_like, shape (N, 4, 4) or (N, 3, 3)
-        Poses or rotation matrices.
+    path : Curve, or array_like, shape (N, 4, 4) or (N, 3, 3)
+        A single curve, which is evaluated at the times, with its velocities and accelerations; or
+        poses or rotation matrices.
     velocities : array_like, shape (N, 6) or (N, 3), optional
         Twists (ω, v), or angular velocities ω, in the body frame, in rad/s and m/s.
+    accelerations : array_like, shape (N, 6) or (N, 3), optional
+        The derivatives (ω', Rᵀ d''), or ω', in the body frame, as ``curve(t, 2)`` returns them.
 
     Examples
     --------
@@ -89,89 +100,138 @@ def write_path(
     >>> c = geodesic(np.eye(4), pose_from_coordinates([0, 0, 3, 2, 0, 0]))
     >>> t = [0, 0.5, 1]
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_path(f"{folder}/path.csv", t, c(t), c(t, 1))
+    ...     write_path(f"{folder}/path.csv", t, c)
     ...     times, poses, twists = read_path(f"{folder}/path.csv")
     >>> bool(np.abs(poses - c(t)).max() < 2e-15)
     True
     """
-    times, poses, velocities = check_path(times, poses, velocities)
+    tum = _is_tum(file)
+    if isinstance(path, Curve):
+        if velocities is not None or accelerations is not None:
+            raise ValueError("velocities, accelerations: those of the curve are written")
+        if path.batch_shape:
+            raise ValueError(f"path: a single curve is wanted, got a stack {path.batch_shape}")
+        path, *rates = path.state(as_single("times", times, "N"))
+        velocities, accelerations = (None, None) if tum else rates
+    times, poses, velocities = check_path(times, path, velocities)
+    if accelerations is not None:
+        if velocities is None:
+            raise ValueError("accelerations: they need velocities, which come before them")
+        _, columns = velocities.shape
+        accelerations = as_single("accelerations", accelerations, "N", columns)
+        if len(accelerations) != len(times):
+            raise ValueError(
+                f"accelerations: {len(times)} are wanted, one for each pose, got "
+                f"{len(accelerations)}"
+            )
     q = continuous_quaternions(quaternion_from_matrix(poses[:, :3, :3]))
     d = poses[:, :3, 3:].reshape(len(poses), -1)
-    if _is_tum(file):
+    if tum:
         if velocities is not None:
             raise ValueError(f"velocities: TUM has no columns for them; {file} must end in .csv")
         if not d.size:
             raise ValueError(f"poses: TUM cannot store rotations alone; {file} must end in .csv")
-        rows = np.column_stack([times, d, np.roll(q, -1, axis=-1)]).tolist()
-        lines = ["# " + " ".join(TUM), *(" ".join(map(repr, row)) for row in rows), ""]
-        write_text(file, "\n".join(lines))
-    else:
-        rates = [] if velocities is None else [velocities]
-        table = np.column_stack([times, d, q, *rates])
-        write_csv(file, HEADERS[d.size > 0, velocities is not None], table.tolist())
+        table, header = np.column_stack([times, d, np.roll(q, -1, axis=-1)]), "timestamp tx ty tz"
+        _write_table(file, f"# {header} qx qy qz qw", " ", table)
+        return
+    rates = [each for each in (velocities, accelerations) if each is not None]
+    names = [name for name in HEADER if d.size or not name.endswith("[m]")]
+    for given, columns in zip(rates, (list(VELOCITIES), ACCELERATIONS), strict=False):
+        names += columns[: given.shape[1]]
+    _write_table(file, ",".join(names), ",", np.column_stack([times, d, q, *rates]))
 
 
-def read_path(file: File) -> tuple[Array, Array, Array | None]:
-    """Read a path that `write_path` wrote, or a TUM trajectory.
+def read_path(
+    file: File,
+    *,
+    format: Literal["csv", "tum", "euroc", "kitti"] | None = None,  # noqa: A002
+    unit: Literal["s", "ms", "us", "ns"] | None = None,
+    times: File | ArrayLike | None = None,
+    rate: float | None = None,
+    start: Literal["first"] | str | float | None = None,
+    skip: Skip | Collection[Skip] = (),
+) -> tuple[Array, Array, Array | None]:
+    """Read a path of poses or rotations from a text file: CSV, TUM, EuRoC, TUM-VI or KITTI.
 
-    A malformed file is rejected as a whole. Each quaternion is replaced by the nearest unit
-    quaternion. CSV files are in UTF-8.
+    The content of the file tells its format, not its name. If a line, which may be a comment, names
+    the columns, then the names tell which column has the time, x, y, z, and the components of the
+    quaternion; units such as [ns] or [mm] in the names are converted. Other columns are not read,
+    except those of velocities that `write_path` wrote. Without names, 8 columns separated by white
+    space are TUM (time, position, quaternion (x, y, z, w)), and 12 are the first three rows of a
+    pose (KITTI). Columns are separated by commas, semicolons, tabs or blanks. If semicolons
+    separate them, decimals may have commas. Blank lines and comments, which begin with #, may be
+    anywhere. Each rotation is replaced by the nearest one. A malformed file is rejected as a whole.
 
     Parameters
     ----------
     file : str or Path
-        A file that `write_path` wrote, or a file in TUM format, whose name ends in ``.tum`` or
-        ``.txt``. In TUM, blank lines and lines that begin with # are skipped.
+        A text file in UTF-8.
+    format : {"csv", "tum", "euroc", "kitti"}, optional
+        The order of the columns, for files that have no names of columns and can be read in two
+        ways. Further columns at the end are not read. By default, the content tells the format.
+    unit : {"s", "ms", "us", "ns"}, optional
+        The unit of the times in the file. By default, the name of the column tells it, EuRoC has
+        ns, and all others have s.
+    times : str, Path or array_like, shape (N,), optional
+        For files without times: a file with one time in each line, or the times.
+    rate : float, optional
+        For files without times: the number of poses in a second. The first pose has the time 0.
+    start : "first" or number, optional
+        The time in s that is subtracted from all times, without rounding before: "first" is the
+        time of the first pose. A string has all its digits. Without it, times since 1970 lose 2e-7
+        s, since doubles are rounded.
+    skip : {"repeated", "nan", "unordered"} or a collection of these, optional
+        Rows that are left out: those whose time equals the time before, those with a missing number
+        or with a quaternion 0, and those whose time is earlier than a time before. The logger
+        ``rbcourse.files`` tells their number and their lines.
 
     Returns
     -------
     times : ndarray, shape (N,)
-        Times in s.
+        Increasing times in s.
     poses : ndarray, shape (N, 4, 4) or (N, 3, 3)
         Poses, or rotation matrices if the file has no positions.
     velocities : ndarray, shape (N, 6) or (N, 3), or None
-        Twists (ω, v), or ω, in the body frame, if the file has them.
+        Twists (ω, v), or ω, in the body frame, if `write_path` wrote them.
 
     Raises
     ------
     ValueError
-        If the file has another format or no pose, if times do not increase, if the norm of a
-        quaternion differs from 1 by more than 1e-3, or if the last line has no line end, since the
-        file may be cut there. The message names the line and the reason.
+        If the format is not recognised; if times do not increase, or cannot be in s; if a number is
+        missing; if the norm of a quaternion, or an entry of RᵀR, is off by more than 1e-3; or if
+        the last line has no line end, since the file may be cut there. The message names the line,
+        the reason, and the argument that helps.
 
     Examples
     --------
     >>> import tempfile
-    >>> path = tempfile.mkdtemp() + "/poses.tum"  # lines of time, position and quaternion x y z w
+    >>> path = tempfile.mkdtemp() + "/recording.txt"
     >>> with open(path, "w") as file:
-    ...     print("0 0 0 0 0 0 0 1", file=file)
-    ...     print("2 1 0 0 0 0 0.6 0.8", file=file)
-    >>> times, poses, velocities = read_path(path)
+    ...     print("# timestamp tx ty tz qx qy qz qw", file=file)
+    ...     print("1403636580.838555648 0 0 0 0 0 0 1", file=file)
+    ...     print("1403636580.838555648 0 0 0 0 0 0 1", file=file)
+    ...     print("1403636580.843555584 1 0 0 0 0 0.6 0.8", file=file)
+    >>> times, poses, velocities = read_path(path, start="first", skip="repeated")
     >>> times, poses.shape, velocities
-    (array([0., 2.]), (2, 4, 4), None)
+    (array([0.        , 0.00499994]), (2, 4, 4), None)
     """
-    tum = _is_tum(file)
-    moves, names, lines = _tum_lines(file) if tum else _csv_table(file)
-    if not lines:
-        raise ValueError(f"{file}: a pose is wanted, but the file ends")
-    table = _numbers(names, lines, " " if tum else ",")
-    if tum:
-        table = table[:, [0, 1, 2, 3, 7, 4, 5, 6]]  # in the order of CSV
-    at = 4 if moves else 1
-    times, d, q, velocities = np.split(table, [1, at, at + 4], axis=1)
-    if (late := np.flatnonzero(times[1:] <= times[:-1])).size:
-        before, after = times[late[0] :, 0][:2]
-        raise ValueError(f"{lines[late[0] + 1][0]}: a time after {before} is wanted, got {after}")
-    with np.errstate(over="ignore"):
-        norm = np.linalg.norm(q, axis=1)
-    if (wrong := np.abs(norm - 1) > _TOLERANCE).any():
-        i = np.argmax(wrong)
-        raise ValueError(
-            f"{lines[i][0]}: a quaternion of norm 1 is wanted, got one of {norm[i]:.6g}"
-        )
-    R = matrix_from_quaternion(project_quaternion(q))
-    poses = join(R, d) if moves else R
-    return times[:, 0], poses, velocities if velocities.size else None
+    skip = [skip] if isinstance(skip, str) else list(skip)
+    for name, values, known in (
+        ("skip", skip, ["repeated", "nan", "unordered"]),
+        ("format", [format], [None, *FORMATS]),
+        ("unit", [unit], [None, *DIGITS]),
+    ):
+        if wrong := [value for value in values if value not in known]:
+            wanted = ", ".join(repr(each) for each in known if each)
+            raise ValueError(f"{name}: one of {wanted} is wanted, got {wrong[0]!r}")
+    if times is not None and rate is not None:
+        raise ValueError("times, rate: one of them is wanted, got both")
+    recording = read_recording(file, format, unit, times, rate, skip)
+    columns = recording.columns
+    R = _rotations(recording)
+    poses = join(R, _stacked(columns, POSITION)) if "x" in columns else R
+    rates = [name for name in VELOCITIES.values() if name in columns]
+    return _relative(recording, start), poses, _stacked(columns, rates) if rates else None
 
 
 def save_plan(file: File, plan: Plan, kind: str) -> None:
@@ -202,7 +262,7 @@ def save_plan(file: File, plan: Plan, kind: str) -> None:
     commands = as_plan(plan, "n")  # the first command determines the number of joints
     names = _velocities(kind, commands[0][0].size if commands else 0)
     rows = [[*velocity, duration] for velocity, duration in as_plan(commands, len(names))]
-    write_csv(file, [*names, DURATION], rows)
+    _write_table(file, ",".join([*names, DURATION]), ",", np.array(rows, dtype=float))
 
 
 @described_by(save_plan, returns="list of (ndarray, float)")
@@ -218,13 +278,14 @@ def load_plan(file: File, kind: str) -> Commands:
     file : str or Path
         A file of comma-separated values in UTF-8. The first line has the names of the columns.
     """
-    lines = ((place, _cells(place, line)) for place, line in text_lines(file))
-    place, header = next(lines, (f"{file}, line 1", []))
+    lines = enumerate(text_lines(file), start=1)
+    places = ((f"{file}, line {number}", line) for number, line in lines)
+    rows = ((place, split_line(place, line)) for place, line in places)
+    place, header = next(rows)
     names = [*_velocities(kind, max(0, len(header) - 1)), DURATION]
     if header != names:
         raise ValueError(f"{place}: {', '.join(names)} are wanted, got {', '.join(header)[:200]!r}")
-    rows = (_row(place, names, cells) for place, cells in lines)
-    return [_command(place, row) for place, row in rows]
+    return [_command(place, _row(place, names, cells)) for place, cells in rows]
 
 
 def replace_file(file: File, content: bytes) -> None:
@@ -268,48 +329,69 @@ def _is_tum(file: File) -> bool:
     return suffix != ".csv"
 
 
-def _csv_table(file: File) -> tuple[bool, list[str], Lines]:
-    """Return whether a CSV file has positions, the names of its columns, and its other lines."""
-    place, first = next(lines := text_lines(file), (f"{file}, line 1", ""))
-    header = _cells(place, first)
-    kind = next((kind for kind, names in HEADERS.items() if names == header), None)
-    if kind is None:
-        wanted = ", ".join(HEADERS[True, True])
+def _rotations(recording: Recording) -> Array:
+    """Return the nearest rotations of the quaternions or matrices of a recording."""
+    columns = recording.columns
+    if "r11" in columns:
+        M = _stacked(columns, [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]).reshape(-1, 3, 3)
+        passed = is_so(M, _TOLERANCE)
+        if not passed.all():
+            raise ValueError(
+                f"{recording.place(np.argmin(passed))}: a rotation matrix is wanted, got "
+                f"{M[np.argmin(passed)].tolist()}"
+            )
+        return project_so(M)
+    q = _stacked(columns, QUATERNION)
+    with np.errstate(over="ignore"):
+        norm = np.linalg.norm(q, axis=1)
+    if (wrong := np.abs(norm - 1) > _TOLERANCE).any():
+        i = np.argmax(wrong)
         raise ValueError(
-            f"{place}: the columns must be {wanted}; those of positions or velocities may be left "
-            f"out. Got {', '.join(header)[:200]!r}. For other files use numpy.loadtxt and "
-            "pose_from_components"
+            f"{recording.place(i)}: a quaternion of norm 1 is wanted, got one of {norm[i]:.6g}"
         )
-    return kind[0], header, list(lines)
+    return matrix_from_quaternion(project_quaternion(q))
 
 
-def _tum_lines(file: File) -> tuple[bool, list[str], Lines]:
-    """Return True (TUM files have positions), the columns, and the lines that are not comments."""
-    lines = ((place, line.strip()) for place, line in text_lines(file))
-    return True, TUM, [(place, line) for place, line in lines if line and line[0] != "#"]
+def _relative(recording: Recording, start: Any) -> Array:
+    """Return the times of a recording after `start`, rounded once."""
+    first = Decimal(0)
+    if start == "first":
+        first = recording.stamps[0]
+    elif start is not None:
+        try:
+            first = Decimal(start)
+        except (ArithmeticError, TypeError, ValueError):
+            first = Decimal("nan")
+        if not first.is_finite():
+            raise ValueError(f"start: None, 'first' or a time in s is wanted, got {start!r}")
+    times = np.array([float(EXACT.subtract(stamp, first)) for stamp in recording.stamps])
+    if (equal := np.flatnonzero(times[1:] <= times[:-1])).size:
+        i = equal[0] + 1
+        raise ValueError(
+            f"{recording.place(i)}: the time {recording.stamps[i]:f} and the time before are the "
+            "same double; start='first' returns times after the first one"
+        )
+    return times
 
 
-def _numbers(names: list[str], lines: Lines, separator: str) -> Array:
-    """Return the numbers of lines that are not empty, shape (lines, names)."""
-    text = "\n".join(line for _, line in lines)
-    if _PLAIN.fullmatch(text):  # fast; otherwise, and after an error, find the first wrong place
-        with suppress(ValueError):
-            delimiter = None if separator == " " else separator
-            table: Array = np.loadtxt(io.StringIO(text), delimiter=delimiter, ndmin=2)
-            if table.shape == (len(lines), len(names)) and np.isfinite(table).all():
-                return table
-    cells = (
-        (place, line.split() if separator == " " else _cells(place, line)) for place, line in lines
-    )
-    return np.array([_row(place, names, row)[1] for place, row in cells])
+def _stacked(columns: dict[str, Array], names: Sequence[str]) -> Array:
+    return np.stack([columns[name] for name in names], axis=-1)
+
+
+def _write_table(file: File, header: str, separator: str, table: Array) -> None:
+    """Write a line of names, and then a line for each row, with all digits of the numbers."""
+    lines = [header]
+    for part in blocks(len(table)):  # lists of Python's numbers take four times the memory
+        lines += [separator.join(map(repr, row)) for row in table[part].tolist()]
+    replace_file(file, ("\n".join(lines) + "\n").encode())
 
 
 def _velocities(kind: str, joints: int) -> list[str]:
     if kind == "joints":
         return [f"v{i} [rad/s]" for i in range(joints)]
-    if kind in list(VELOCITIES):
-        return VELOCITIES[kind]
-    wanted = ", ".join(map(repr, [*VELOCITIES, "joints"]))
+    if kind in list(PLANAR):
+        return PLANAR[kind]
+    wanted = ", ".join(map(repr, [*PLANAR, "joints"]))
     raise ValueError(f"kind: one of {wanted} is wanted, got {kind!r}")
 
 
@@ -319,60 +401,8 @@ def _command(place: str, row: list[float]) -> tuple[Array, float]:
     return as_command(f"{place}:", (row[:-1], row[-1]), "n")
 
 
-def _row(place: str, names: list[str], cells: list[str]) -> tuple[str, list[float]]:
+def _row(place: str, names: list[str], cells: list[str]) -> list[float]:
     if len(cells) != len(names):
         raise ValueError(f"{place}: {len(names)} numbers are wanted, got {len(cells)}")
     numbers = zip(names, cells, strict=True)
-    return place, [to_number(f"{place}, {name}", cell) for name, cell in numbers]
-
-
-def _cells(place: str, line: str) -> list[str]:
-    try:
-        row = next(csv.reader([line], strict=True), [])
-    except csv.Error as error:
-        raise ValueError(f"{place}: {error}") from error
-    return [cell.strip(" \t") for cell in row]
-
-
-def text_lines(file: File) -> Iterator[tuple[str, str]]:
-    """Yield the place and the text of each line of a file; blank lines at the end are skipped.
-
-    A last line without a line end raises ValueError, because the file may have been cut there.
-    """
-    with open(file, "rb") as stream:
-        content = stream.read()
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = len(re.split(rb"\r\n|\n|\r", content[: error.start]))
-        raise ValueError(f"{file}, line {line}: the text is not in UTF-8") from error
-    if text and text.rstrip(" \t")[-1:] not in ("\n", "\r"):
-        line = len(re.split("\r\n|\n|\r", text))
-        raise ValueError(
-            f"{file}, line {line}: the line has no line end, so the file may be cut; if it is "
-            "complete, add a line end"
-        )
-    lines = re.split("\r\n|\n|\r", text.rstrip(" \t\r\n"))
-    yield from ((f"{file}, line {number}", line) for number, line in enumerate(lines, start=1))
-
-
-def write_csv(file: File, names: list[str], rows: Iterable[Iterable[float]]) -> None:
-    """Write a line of names, and then a line for each row, with all digits of the numbers."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([float(x) for x in row] for row in rows)
-    write_text(file, text.getvalue())
-
-
-def write_text(file: File, text: str) -> None:
-    """Write a text file with the same bytes on every system."""
-    replace_file(file, text.encode())
-
-
-def to_number(place: str, cell: str) -> float:
-    """Return a cell as a finite number, or raise a ValueError that names its place."""
-    number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
-    if not np.isfinite(number):
-        raise ValueError(f"{place}: a finite number is wanted, got {cell[:40]!r}")
-    return number
+    return [to_number(f"{place}, {name}", cell) for name, cell in numbers]

@@ -130,7 +130,7 @@ def test_the_folders_of_the_package_are_floors():
     )
     drawn = {x for x in known if x.startswith(("rbcourse.draw", "rbcourse.report"))}
     groups = known.keys() - curves - optimum - drawn
-    groups -= {"rbcourse", "rbcourse.closed_forms", "rbcourse.textbook"}
+    groups -= {"rbcourse", *(f"rbcourse.{x}" for x in ("closed_forms", "files", "textbook"))}
     assert {x: graph[x] & (curves | optimum) for x in groups if graph[x] & (curves | optimum)} == {}
     assert {x: graph[x] & optimum for x in curves if graph[x] & optimum} == {}
     floors = {}

@@ -1,0 +1,322 @@
+"""Test the formats of recordings, as their publishers describe them, and exact times."""
+
+import logging
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import rbcourse as rb
+
+# Each good file has the pose P at its first time; its quaternion is (0.8, 0, 0, 0.6).
+P = np.array([[0.28, -0.96, 0, 1.5], [0.96, 0.28, 0, -0.25], [0, 0, 1, 0.75], [0, 0, 0, 1]])
+XYZW, WXYZ, D = "0 0 0.6 0.8", "0.8,0,0,0.6", "1.5,-0.25,0.75"
+ROW, ROWS = f"1.5 -0.25 0.75 {XYZW}", f"{D},{WXYZ}"
+KITTI = "0.28 -0.96 0 1.5 0.96 0.28 0 -0.25 0 0 1 0.75\n"
+EUROC = (
+    "#timestamp{}, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+    "q_RS_z []"
+)
+STATE = ", v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1]"
+OWN = "time [s],x [m],y [m],z [m],qw [1],qx [1],qy [1],qz [1]"
+ROS = "field.pose.position.x,field.pose.position.y,field.pose.position.z,"
+ROS += ",".join(f"field.pose.orientation.{axis}" for axis in "xyzw")
+GOOD = {
+    # file: (text, options, times)
+    "tum_rgbd.txt": (
+        f"# ground truth trajectory\n# file: 'fr2.bag'\n# timestamp tx ty tz qx qy qz qw\n"
+        f"1311868164.3631 {ROW}\n1311868164.3731 {ROW}\n",
+        {"start": "first"},
+        [0, 0.01],
+    ),
+    "orb_slam2.txt": (f"1305031102.160407 1.5000000 -0.2500000 0.7500000 {XYZW}\n", {}, None),
+    "orb_slam3.txt": (
+        f"1403636580838555648.000000 {ROW}\n1403636580843555584.000000 {ROW}\n",
+        {"unit": "ns", "start": "first"},
+        [0, 0.004999936],
+    ),
+    "header_no_hash.txt": (f"timestamp tx ty tz qx qy qz qw\n0.0 {ROW}\n", {}, [0]),
+    "open_vins.txt": (
+        "# timestamp(s) tx ty tz qx qy qz qw Pr11 Pr12 Pr13\n"
+        f"1403636580.83856 {ROW} 0.01 0 0\n",
+        {},
+        [1403636580.83856],
+    ),
+    "rpg_stamped_groundtruth.txt": (f"# time x y z qx qy qz qw\n1.5 {ROW}\n", {}, [1.5]),
+    "rpg_with_ids.txt": (f"# id timestamp tx ty tz qx qy qz qw\n7 1.5 {ROW}\n", {}, [1.5]),
+    "tabs.txt": (f"0.5 {ROW}\n".replace(" ", "\t"), {}, [0.5]),
+    "commas.tum": (f"0.5 {ROW}\n".replace(" ", ","), {}, [0.5]),
+    "commas.txt": (f"0.5 {ROW}\n".replace(" ", ","), {"format": "tum"}, [0.5]),
+    "scientific.txt": (f"5.0e-01   {ROW}\n", {}, [0.5]),
+    "comments.txt": (f"0.5 {ROW} # here\n# a break\n\n% and here\n1 {ROW}\n", {}, [0.5, 1]),
+    "old_mac.txt": (f"0.5 {ROW}\r1 {ROW}\r", {}, [0.5, 1]),
+    "euroc.csv": (
+        f"{EUROC.format('')}{STATE}\n1403636580838555648,{ROWS},0,0,0,0\n",
+        {"start": "1403636580.8"},
+        [0.038555648],
+    ),
+    "tum_vi.csv": (
+        f"{EUROC.format(' [ns]')}\n1520530308206190000,{ROWS}\n1520530308214190000,{ROWS}\n",
+        {"start": "first"},
+        [0, 0.008],
+    ),
+    "euroc_without_header.csv": (
+        f"1403636580838555648,{ROWS},0,0\n",
+        {"format": "euroc"},
+        [1403636580.838555648],
+    ),
+    "okvis.csv": (
+        "timestamp, p_WS_W_x, p_WS_W_y, p_WS_W_z, q_WS_x, q_WS_y, q_WS_z, q_WS_w, v_WS_W_x\n"
+        f"1403636580838555648, 1.5, -0.25, 0.75, {XYZW.replace(' ', ', ')}, 3\n",
+        {"unit": "ns"},
+        None,
+    ),
+    "kitti.txt": (KITTI * 2, {"rate": 10}, [0, 0.1]),
+    "kitti_times.txt": (KITTI * 2, {"times": [0, 0.1037]}, [0, 0.1037]),
+    "newer_college.csv": (
+        f"#sec,nsec,x,y,z,qx,qy,qz,qw\n1583836591,182590976,{D},{XYZW.replace(' ', ',')}\n",
+        {"start": "1583836591"},
+        [0.182590976],
+    ),
+    "rostopic_echo.csv": (
+        f"%time,field.header.seq,field.header.stamp,field.header.frame_id,{ROS}\n"
+        f'1583836591182590976,4,1583836591000000000,"map",{D},{XYZW.replace(" ", ",")}\n',
+        {"unit": "ns"},
+        [1583836591],
+    ),
+    "ros2_bag.csv": (
+        "header.stamp.sec,header.stamp.nanosec,header.frame_id,"
+        + ROS.replace("field.", "pose.")
+        + f"\n12,500000000,map,{D},{XYZW.replace(' ', ',')}\n",
+        {},
+        [12.5],
+    ),
+    "plotjuggler.csv": (
+        "__time,"
+        + ",".join(f"/odom/pose/pose/position/{axis}" for axis in "xyz")
+        + ","
+        + ",".join(f"/odom/pose/pose/orientation/{axis}" for axis in "wxyz")
+        + ",/odom/twist/twist/linear/x\n"
+        + f"1583836591.5,{ROWS},3\n",
+        {},
+        [1583836591.5],
+    ),
+    "airsim_rec.txt": (
+        "VehicleName\tTimeStamp\tPOS_X\tPOS_Y\tPOS_Z\tQ_W\tQ_X\tQ_Y\tQ_Z\tImageFile\n"
+        + f"Drone\t1583836591182\t{ROWS}".replace(",", "\t")
+        + "\timg_1.png\n",
+        {"unit": "ms"},
+        [1583836591.182],
+    ),
+    "lamar_trajectories.txt": (
+        "# timestamp, device_id, qw, qx, qy, qz, tx, ty, tz\n"
+        f"1000.25, phone_3, 0.8, 0, 0, 0.6, {D}\n",
+        {},
+        [1000.25],
+    ),
+    "pandas.csv": (f",time,x,y,z,qw,qx,qy,qz,label\n0,0.5,{ROWS},a\n1,1.0,{ROWS},\n", {}, [0.5, 1]),
+    "excel_german.csv": (
+        f"\ufeff{OWN}".replace(",", ";") + "\r\n0,5;1,5;-0,25;0,75;0,8;0;0;0,6\r\n",
+        {},
+        [0.5],
+    ),
+    "excel_text.txt": ("0,5\t1,5\t-0,25\t0,75\t0\t0\t0,6\t0,8\r\n", {}, [0.5]),
+    "millimetres.csv": (
+        f"Time (Seconds),X (mm),Y (mm),Z (mm),QW,QX,QY,QZ\n0.5,1500,-250,750,{WXYZ}\n",
+        {},
+        [0.5],
+    ),
+    "units_in_names.csv": (
+        f"t_ms,pos_x,pos_y,pos_z,rot_w,rot_x,rot_y,rot_z\n500,{ROWS}\n",
+        {},
+        [0.5],
+    ),
+    "tartanair.txt": (f"{ROW}\n{ROW}\n", {"rate": 10}, [0, 0.1]),
+    "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", {"times": [3]}, [3]),
+    "own.csv": (f"{OWN}\n0.5,{ROWS}\n\n# here\n1,{ROWS}\n", {}, [0.5, 1]),
+    "quoted.csv": (
+        f'"time","x","y","z","qw","qx","qy","qz","a, b"\n"0.5",{ROWS},"1, 2"\n',
+        {},
+        [0.5],
+    ),
+}  # fmt: skip
+REFUSED = {
+    "kitti.txt": (KITTI, "is a KITTI file, without times: times= takes a file"),
+    "kitti_with_frame.txt": ("0 " + KITTI, "13 columns.*remove it"),
+    "replica.txt": ("1 0 0 0 " * 4 + "\n", "16 columns.*reshape"),
+    "tartanair.txt": (f"{ROW}\n", "7 columns.*TUM poses without times, times= or rate="),
+    "nclt.csv": ("1326030975726043,1,2,3,0.1,0.2,0.3\n", "7 columns without names"),
+    "arkit.csv": (f"0.5,{ROWS}\n", "format='tum' reads quaternions.*format='csv'"),
+    "leica.csv": (
+        "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m]\n1403636580838555648,1,2,3\n",
+        "4 columns without names",
+    ),
+    "euler.csv": ("time,x,y,z,roll,pitch,yaw\n0,1,2,3,0,0,0\n", "no column has the name qw"),
+    "motive.csv": ("Format Version,1.23,Take Name,a\n,,,\n", "4 columns without names"),
+    "colmap_images.txt": ("1 0.8 0 0 0.6 1.5 0.25 0.75 1 a.jpg\n2 3 -1\n", "10 columns"),
+    "two_bodies.csv": (
+        f"time,a_pos_x,b_pos_x,y,z,qw,qx,qy,qz\n0,1,{ROWS}\n",
+        "'a_pos_x' and 'b_pos_x' both name a column of x; rename one",
+    ),
+    "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", "names no column of times: times= takes"),
+    "inches.csv": (f"time,x [in],y [in],z [in],qw,qx,qy,qz\n0,{ROWS}\n", "positions in m, cm or"),
+    "minutes.csv": (f"time [min],x,y,z,qw,qx,qy,qz\n0,{ROWS}\n", "times in s, ms, us or ns"),
+    "half_of_the_rates.csv": (f"{OWN},wx body [rad/s]\n0,{ROWS},1\n", "the name wy or wz or vx"),
+    "names.csv": (f"time,x,y,z,qw,qx,qy\n0,{ROWS}\n", "line 1: 8 names of columns are wanted"),
+    "nanoseconds.txt": (f"1403636580838555648 {ROW}\n", "unit='ns' converts"),
+    "microseconds.txt": (f"1403636580838555 {ROW}\n", "unit='us' converts"),
+    "milliseconds.txt": (f"1403636580838 {ROW}\n", "unit='ms' converts"),
+    "relative_ns.txt": ("".join(f"{5000000 * i} {ROW}\n" for i in range(9)), "unit='ns' converts"),
+    "relative_us.txt": ("".join(f"{5000 * i} {ROW}\n" for i in range(9)), "unit='us' converts"),
+    "near.txt": (f"1403636580.12345678 {ROW}\n1403636580.12345679 {ROW}\n", "start='first'"),
+    "lost.txt": (f"0 {ROW}\n1 NaN NaN NaN NaN NaN NaN NaN\n", "line 2: .*skip='nan'"),
+    "vicon.csv": (f"{OWN}\n0,{ROWS}\n1,0,0,0,0,0,0,0\n", "line 3: .*skip='nan'"),
+    "empty_cells.csv": (f"{OWN}\n0,{ROWS}\n1,,,,,,,\n", "line 3: .*skip='nan'"),
+    "twice.txt": (f"0 {ROW}\n0.1 {ROW}\n0.10 {ROW}\n", "line 3: .*skip='repeated'"),
+    "back.txt": (f"0 {ROW}\n0.2 {ROW}\n0.1 {ROW}\n", "line 3: .*skip='unordered'"),
+    "utf_16.csv": (f"{OWN}\n0,{ROWS}\n".encode("utf-16"), "line 1: the text is not in UTF-8"),
+    "empty.txt": ("", "no line with numbers"),
+}  # fmt: skip
+
+
+def written(folder, name, text):
+    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return folder / name
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_public_formats_are_read(tmp_path, name):
+    text, options, wanted = GOOD[name]
+    times, poses, velocities = rb.read_path(written(tmp_path, name, text), **options)
+    assert np.abs(poses - P).max() < 1e-15
+    assert velocities is None
+    assert wanted is None or times.tolist() == wanted
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_messages_name_the_file_and_the_next_step(tmp_path, name):
+    text, message = REFUSED[name]
+    file = written(tmp_path, name, text)
+    with pytest.raises(ValueError, match=f"(?s){name}.*{message}"):
+        rb.read_path(file)
+
+
+def test_matrices_that_are_not_rotations_are_refused(tmp_path):
+    file = written(tmp_path, "a.txt", KITTI + "1 0 0 0 0 1.01 0 0 0 0 1 0\n")
+    with pytest.raises(ValueError, match=r"a\.txt, line 2: a rotation matrix is wanted, got \[\["):
+        rb.read_path(file, rate=10)
+
+
+def test_names_in_any_order_tell_the_columns(tmp_path):
+    rng = np.random.default_rng(5)
+    names, cells = f"time,x,y,z,qw,qx,qy,qz,extra;0.5,{ROWS},7".split(";")
+    for _ in range(20):
+        order = rng.permutation(9)
+        lines = [",".join(np.array(line.split(","))[order]) for line in (names, cells)]
+        times, poses, _ = rb.read_path(written(tmp_path, "a.csv", "\n".join([*lines, ""])))
+        assert times == 0.5
+        assert np.abs(poses - P).max() < 1e-15
+
+
+def test_times_in_a_second_file_are_exact(tmp_path):
+    file = written(tmp_path, "00.txt", KITTI * 3)
+    clock = written(tmp_path, "times.txt", "1e9\n1000000000.1\n1000000000.2\n")
+    times, *_ = rb.read_path(file, times=clock, start="first")
+    assert times.tolist() == [0, 0.1, 0.2]
+    with pytest.raises(ValueError, match="times: 3 are wanted, one for each pose, got 2"):
+        rb.read_path(file, times=[0, 1])
+    with pytest.raises(ValueError, match=r"times.txt, line 2: a finite number is wanted, got 'x'"):
+        rb.read_path(file, times=written(tmp_path, "times.txt", "0\nx\n2\n"))
+    with pytest.raises(ValueError, match="times, rate: one of them is wanted, got both"):
+        rb.read_path(file, times=clock, rate=3)
+    with pytest.raises(ValueError, match=r"times, rate: .*a\.tum has times, in column 1"):
+        rb.read_path(written(tmp_path, "a.tum", f"0 {ROW}\n"), rate=3)
+
+
+def test_relative_times_are_rounded_once(tmp_path):
+    """Doubles since 1970 are apart by 2.4e-7 s, which an acceleration at 1 kHz does not survive."""
+    stamps = [
+        Decimal("1755000000.123456789") + Decimal(i) * Decimal("0.001000001") for i in range(99)
+    ]
+    for unit, digits in {"s": 0, "ms": 3, "us": 6, "ns": 9}.items():
+        text = "".join(f"{stamp.scaleb(digits):f} {ROW}\n" for stamp in stamps)
+        file = written(tmp_path, "a.txt", text)
+        exact = [float(Fraction(stamp) - Fraction(stamps[0])) for stamp in stamps]
+        assert rb.read_path(file, unit=unit, start="first")[0].tolist() == exact
+        exact = [float(Fraction(stamp) - 1755000000) for stamp in stamps]
+        assert rb.read_path(file, unit=unit, start=1755000000)[0].tolist() == exact
+        assert rb.read_path(file, unit=unit)[0].tolist() == list(map(float, stamps))
+
+
+def test_accelerations_survive_a_clock_since_1970(tmp_path):
+    t, start = np.arange(200) / 1000, 1755000000
+    x = 3 * t**2 / 2
+    text = "".join(
+        f"{start + 0.0:.0f}.{i:03d} {a!r} 0 0 0 0 0 1\n" for i, a in enumerate(x.tolist())
+    )
+    times, poses, _ = rb.read_path(written(tmp_path, "a.txt", text), start="first")
+    second = np.diff(poses[:, 0, 3], 2) / np.diff(times)[1:] ** 2
+    assert np.abs(second - 3).max() < 1e-6
+
+
+def test_skipped_rows_are_left_out_and_told(tmp_path, caplog):
+    lost = "nan nan nan nan nan nan nan"
+    rows = [f"0 {lost}", f"1 {ROW}", f"1 {ROW}", f"3 {ROW}", f"2 {ROW}", f"2.5 {ROW}", f"3 {ROW}"]
+    file = written(tmp_path, "a.txt", "# here\n" + "\n".join([*rows, f"4 {lost}", f"5 {ROW}", ""]))
+    with caplog.at_level(logging.WARNING, logger="rbcourse.files"):
+        times, poses, _ = rb.read_path(file, start="first", skip=("repeated", "nan", "unordered"))
+    assert times.tolist() == [0, 2, 4]
+    assert np.abs(poses - P).max() < 1e-15
+    assert [record.getMessage().removeprefix(f"{file}: ") for record in caplog.records] == [
+        "left out nan rows (2), in line 2, 9",
+        "left out repeated rows (2), in line 4, 8",
+        "left out unordered rows (2), in line 6, 7",
+    ]
+    for skip in ("nan", ["nan", "unordered"]):
+        with pytest.raises(ValueError, match=r"line 4: .*skip='repeated'"):
+            rb.read_path(file, skip=skip)
+    with pytest.raises(ValueError, match="no row has all its numbers"):
+        rb.read_path(written(tmp_path, "b.txt", f"0 {lost}\n"), skip="nan")
+    for name, value in {"skip": "late", "format": "bag", "unit": "min", "start": "last"}.items():
+        with pytest.raises(ValueError, match=f"^{name}: .* wanted, got '{value}'"):
+            rb.read_path(written(tmp_path, "c.txt", f"0 {ROW}\n"), **{name: value})
+
+
+def test_a_curve_is_written_with_its_velocities_and_accelerations(tmp_path):
+    ends = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0], [0.3, -1, 2, 1, 2, 3]])
+    t = np.linspace(0, 2, 21)
+    for path in (ends, ends[:, :3, :3]):
+        curve = rb.projected_spline([0, 2], path, "rest")
+        rb.write_path(tmp_path / "a.csv", t, curve)
+        names = (tmp_path / "a.csv").read_text("utf-8").splitlines()[0].split(",")
+        table = np.loadtxt(tmp_path / "a.csv", delimiter=",", skiprows=1)
+        columns = dict(zip(names, table.T, strict=True))
+        size = curve.size == 4
+        for order, (letters, units) in {
+            1: ("wv", ("rad/s", "m/s")),
+            2: (["alpha", "a"], ("rad/s^2", "m/s^2")),
+        }.items():
+            for kind in range(1 + size):
+                of = curve(t, order)[:, 3 * kind : 3 * kind + 3]
+                for axis, x in zip("xyz", of.T, strict=True):
+                    assert np.array_equal(columns[f"{letters[kind]}{axis} body [{units[kind]}]"], x)
+        times, poses, velocities = rb.read_path(tmp_path / "a.csv")
+        assert np.array_equal(times, t)
+        assert np.abs(poses - curve(t)).max() < 1e-14
+        assert np.array_equal(velocities, curve(t, 1))
+    curve = rb.projected_spline([0, 2], ends, "rest")
+    rb.write_path(tmp_path / "a.tum", t, curve)
+    assert np.abs(rb.read_path(tmp_path / "a.tum")[1] - curve(t)).max() < 1e-14
+    stack = rb.geodesic(ends[:1], ends)
+    for arguments, message in (
+        ((t, curve, t), "velocities, accelerations: those of the curve"),
+        (([0, 3], curve), r"t\[1\] is 3.0, a time in"),
+        ((t, stack), r"path: a single curve is wanted, got a stack"),
+        (([0, 1], ends, None, np.zeros((2, 6))), "accelerations: they need velocities"),
+        (([0, 1], ends, np.zeros((2, 6)), np.zeros((3, 6))), "accelerations: 2 are wanted"),
+        (([0, 1], ends, np.zeros((2, 6)), np.zeros((2, 3))), "accelerations: shape"),
+    ):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            rb.write_path(tmp_path / "b.csv", *arguments)
+        assert not (tmp_path / "b.csv").exists()
