@@ -28,9 +28,10 @@ find out whether an optimum is a minimum     c.certified
 follow a path in the least time              fastest; limits_used for the use of each limit
 read and write paths                         read_path, write_path
 draw                                         draw.profiles, and the module draw
+draw a figure of BK or RR again              paper.figure_1 to figure_5, report.figure_4 to figure_9
 
 The modules closed_forms, quaternion, metrics, connection, planar, arm, sampling, straight_line,
-optimum, files, textbook (short versions of the main algorithms), report and draw have more.
+optimum, files, textbook (short versions of the main algorithms), paper, report and draw have more.
 
 Conventions: angles are in rad, and lengths in m. Velocities are in the body frame, per unit of
 time: angular velocities ω, shape (3,), of rotations, and twists (ω, v), shape (6,), of poses. The
@@ -193,6 +194,7 @@ if TYPE_CHECKING:
     from rbcourse import files as files
     from rbcourse import metrics as metrics
     from rbcourse import optimum as optimum
+    from rbcourse import paper as paper
     from rbcourse import planar as planar
     from rbcourse import projection as projection
     from rbcourse import quaternion as quaternion
@@ -209,6 +211,7 @@ else:
         "files",
         "metrics",
         "optimum",
+        "paper",
         "planar",
         "projection",
         "quaternion",

@@ -1,4 +1,12 @@
-"""The functions of the report RR, with the names and signatures of the report.
+"""The functions of the report RR, with the names and signatures of the report, and its figures.
+
+`figure_4` to `figure_9` are the figures 4 to 9 of the report; their defaults are the numbers of the
+lessons, since the report prints no numbers for them. A function returns a
+`rbcourse.draw.drawing.Drawing`: its ``figure`` is a Matplotlib figure, its ``data`` are the plotted
+numbers, and its ``save()`` writes PNG, PDF, CSV and GIF. ``python -m rbcourse.report --help``
+explains the command, which draws figures into files, such as
+``python -m rbcourse.report 4 --rng 7 --folder mine``. `visualize` and the other functions of the
+report draw any sample and any path.
 
 Arguments that the report does not have are keyword-only. For inputs of a wrong shape or with
 non-finite entries, a check returns False, and a correction raises ValueError.
@@ -19,8 +27,9 @@ naive : bool
     Whether to draw by the naive method, which is not uniform.
 rng : Generator, int or None, optional
     A generator, a seed, or None for fresh numbers.
-start, goal : array_like, shape (n,)
-    The joint angles at both ends, in rad; n = 2 for the arm of the report.
+start, goal : array_like, shape (n,) or (3,)
+    The joint angles at both ends, in rad; n = 2 for the arm of the report. For `figure_6`, planar
+    poses (x, y, theta).
 start_pose : array_like, shape (3,) or (n,)
     The planar pose (x, y, theta), in m, m and rad, or the joint angles of the arm, in rad.
 goal_pose : array_like, shape (3,)
@@ -33,8 +42,8 @@ frame : {"world", "body"}, optional
 path : array_like, shape (states, 3) or (states, n)
     Planar poses (x, y, theta), in m, m and rad, or joint angles, in rad.
 length : float, optional
-    The length of the rectangle, in m, by default a fifth of the larger extent of the path, or 1 m
-    if the body does not move.
+    The length of the rectangle, in m. `visualize_path` has a fifth of the larger extent of the
+    path, or 1 m if the body does not move.
 lengths : array_like, shape (n,), optional
     The lengths of the links, above 0, in m.
 steps : int, optional
@@ -45,7 +54,7 @@ shortest : bool, optional
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -59,9 +68,12 @@ from rbcourse._numerics import Array
 from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
 from rbcourse.draw.animate import Animation, Update, animate
 from rbcourse.draw.arm import describe_arm, moving_arm
+from rbcourse.draw.arm import path_table as joint_table
+from rbcourse.draw.drawing import Drawing, run, style
 from rbcourse.draw.plane import describe_route, extent_of, moving_route
-from rbcourse.draw.spheres import describe_images, moving_images
-from rbcourse.planar import Plan, interpolate_planar, propagate_planar
+from rbcourse.draw.plane import path_table as route_table
+from rbcourse.draw.spheres import Images, describe_images, image_table, moving_images
+from rbcourse.planar import Plan, as_plan, interpolate_planar, propagate_planar
 from rbcourse.projection import is_se, is_so, project_se, project_so
 from rbcourse.quaternion import (
     is_unit_quaternion,
@@ -84,6 +96,12 @@ __all__ = [
     "correct_SEn",
     "correct_SOn",
     "correct_quaternion",
+    "figure_4",
+    "figure_5",
+    "figure_6",
+    "figure_7",
+    "figure_8",
+    "figure_9",
     "forward_propagate_arm",
     "forward_propagate_rigid_body",
     "interpolate_arm",
@@ -98,6 +116,17 @@ __all__ = [
 
 _V0 = np.array([0.0, 0.0, 1.0])
 _V1 = np.array([0.0, 0.2, 0.0]) + _V0
+_ROUTE: Plan = [
+    ([1, 0, 0], 3),
+    ([0, 0, np.pi / 4], 1),
+    ([1, 1, 0], 2),
+    ([1, 0, -np.pi / 4], 3),
+]
+"""The plan of `figure_7`, with velocities in the world frame."""
+_FROM, _TO = np.radians([[-20, 110], [130, -60]])
+"""The joint angles at both ends of `figure_8`."""
+_TURNS: Plan = [([np.pi / 4, 0], 3), ([0, np.pi / 4], 3), ([-np.pi / 4, np.pi / 4], 3)]
+"""The plan of `figure_9`: the shoulder turns, then the elbow, then both."""
 
 
 def check_SOn(m: ArrayLike, epsilon: float = 0.01) -> bool:
@@ -365,6 +394,173 @@ def visualize_arm_path(path: ArrayLike, *, lengths: ArrayLike = LINKS) -> tuple[
     return _show_path("arm_path", alt, states, lambda ax, p: moving_arm(ax, states, p, lengths))
 
 
+def figure_4(*, rng: Rng = 4, steps: int = 100) -> Drawing:
+    """Draw random rotation matrices on two spheres: with three uniform angles, and uniform ones.
+
+    The figure shows the images of v0 = (0, 0, 1) and v1 = v0 + (0, ε, 0). Another sample has
+    another seed `rng`.
+    Source: RR Fig. 4.
+
+    Examples
+    --------
+    >>> drawing = figure_4(rng=7, steps=2)
+    >>> list(drawing.data)[:2]
+    ['three angles v0 x [1]', 'three angles v0 y [1]']
+    >>> plt.close(drawing.figure)
+    """
+    count, images = as_count("steps", steps), {}
+    for name, sample in (("three angles", sample_rotation_naive), ("uniform", sample_rotation)):
+        R = sample(count, rng=rng)
+        images[name] = R @ _V0, R @ _V1
+    return _two_spheres("report_fig4", images)
+
+
+def figure_5(*, rng: Rng = 6, steps: int = 100) -> Drawing:
+    """Draw random quaternions as `figure_4` draws random matrices.
+
+    Source: RR Fig. 5.
+
+    Examples
+    --------
+    >>> drawing = figure_5(steps=2)
+    >>> plt.close(drawing.figure)
+    """
+    count, images = as_count("steps", steps), {}
+    for name, sample in (("three angles", sample_quaternion_naive), ("uniform", sample_quaternion)):
+        q = sample(count, rng=rng)
+        images[name] = rotate_by_quaternion(q, _V0), rotate_by_quaternion(q, _V1)
+    return _two_spheres("report_fig5", images)
+
+
+def figure_6(
+    *,
+    start: ArrayLike = (0, 0, 0),
+    goal: ArrayLike = (6, 3, np.pi / 2),
+    steps: int = 50,
+    length: float = 1.2,
+) -> Drawing:
+    """Draw a rectangle that moves between two planar poses.
+
+    Source: RR Fig. 6.
+
+    Examples
+    --------
+    >>> drawing = figure_6(goal=[4, 2, 1])
+    >>> drawing.data["x [m]"][[0, -1]]
+    array([0., 4.])
+    >>> plt.close(drawing.figure)
+    """
+    ends = as_single("start", start, 3), as_single("goal", goal, 3)
+    path = interpolate_planar(*ends, steps)
+    pale = range(0, len(path), max(1, steps // 5))
+    return _moving("report_fig6", path, pale, {"figsize": (5, 3.4)}, length=length)
+
+
+def figure_7(*, plan: Plan = _ROUTE, length: float = 1.2) -> Drawing:
+    """Draw a rectangle that follows a plan of velocities in the world frame, in steps of 0.1 s.
+
+    Source: RR Fig. 7.
+
+    Examples
+    --------
+    >>> drawing = figure_7(plan=[([1, 0, 0.5], 2), ([0, 1, 0], 1)])
+    >>> drawing.data["theta [rad]"][[0, -1]]
+    array([0., 1.])
+    >>> plt.close(drawing.figure)
+    """
+    pieces, pale = _pieces(plan, 3)
+    path = forward_propagate_rigid_body([0, 0, 0], pieces)
+    return _moving("report_fig7", path, pale, {"figsize": (7, 3.1), "dpi": 80}, 5.0, length=length)
+
+
+def figure_8(
+    *,
+    start: ArrayLike = _FROM,
+    goal: ArrayLike = _TO,
+    steps: int = 60,
+) -> Drawing:
+    """Draw an arm whose joint angles change linearly between two postures.
+
+    Source: RR Fig. 8.
+
+    Examples
+    --------
+    >>> drawing = figure_8(goal=[1, 1])
+    >>> plt.close(drawing.figure)
+    """
+    path = interpolate_arm(start, goal, steps=steps)
+    pale = range(0, steps, max(1, round(steps / 4.6)))
+    return _moving("report_fig8", path, pale, {"figsize": (4.2, 4.2)})
+
+
+def figure_9(*, plan: Plan = _TURNS) -> Drawing:
+    """Draw an arm that follows a plan of joint velocities, in steps of 0.1 s.
+
+    Source: RR Fig. 9.
+
+    Examples
+    --------
+    >>> drawing = figure_9(plan=[([1, 0], 1.5), ([0, 1], 1)])
+    >>> plt.close(drawing.figure)
+    """
+    pieces, pale = _pieces(plan, 2)
+    path = forward_propagate_arm([0, 0], pieces)
+    return _moving("report_fig9", path, pale, {"figsize": (4.2, 4.2)})
+
+
+FIGURES: dict[str, Callable[..., Drawing]] = {
+    name[-1]: globals()[name] for name in __all__ if name.startswith("figure_")
+}
+"""The functions of the figures by their names."""
+
+
+def _two_spheres(name: str, images: Images) -> Drawing:
+    with style():
+        shape: Any = {"figsize": (5.8, 3), "layout": "none"}
+        fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"}, **shape)
+        fig.subplots_adjust(0, 0, 1, 0.9, 0)
+        update = moving_images(axes, images)
+    frames = len(next(iter(images.values()))[0]) + 1
+    moving = update, frames, max(6.0, frames / 25)
+    return Drawing(fig, name, image_table(images), describe_images(images), moving)
+
+
+def _pieces(plan: Plan, size: int) -> tuple[Plan, list[int]]:
+    """Return a plan in steps of at most 0.1 s, and the states that are drawn in a pale colour.
+
+    These are the ends of the commands, and the middle of each command that moves a body on an arc.
+    """
+    pieces: list[tuple[Array, float]] = []
+    ends, middles = [0], list[int]()
+    for velocity, duration in as_plan(plan, size):
+        count = max(1, round(10 * duration))
+        if size == 3 and velocity[2] and velocity[:2].any():
+            middles.append(len(pieces) + count // 2)
+        pieces += count * [(velocity, duration / count)]
+        ends.append(len(pieces))
+    return pieces, [*ends, *middles]
+
+
+def _moving(
+    name: str,
+    path: Array,
+    pale: Iterable[int],
+    shape: dict[str, Any],
+    seconds: float = 4.0,
+    *,
+    length: float | None = None,
+) -> Drawing:
+    """Draw a path of a rectangle, or of an arm if no length is given."""
+    with style():
+        fig, ax = plt.subplots(**shape)
+        if length is None:
+            update, data, alt = moving_arm(ax, path, pale), joint_table(path), describe_arm(path)
+        else:
+            update = moving_route(ax, path, length, pale)
+            data, alt = route_table(path), describe_route(path)
+    return Drawing(fig, name, data, alt, (update, len(path), max(seconds, len(path) / 25)))
+
+
 def _show_images(name: str, alt: str, images: Any) -> tuple[Figure, Animation]:
     fig, ax = plt.subplots(
         figsize=(5, 5), dpi=80, layout="none", subplot_kw={"projection": "space"}
@@ -413,3 +609,6 @@ def _rotation_vector(rotation: ArrayLike) -> Array:
 
 for _name in __all__:
     described_by(__doc__)(globals()[_name])
+
+if __name__ == "__main__":
+    run("rbcourse.report", FIGURES)

@@ -124,6 +124,8 @@ def test_the_works_that_a_lesson_cites_are_listed_at_its_end(path):
 def test_every_stored_figure_is_drawn():
     sources = "".join(path.read_text("utf-8") for path in LESSONS)
     names = set(re.findall(r'save_(?:figure\(fig, |animation\(fig, |table\()\\"(\w+)\\"', sources))
+    texts = re.findall(r'(paper|report)\.figure_(\d)\((?:\\"([abc])\\")?', sources)
+    names |= {f"{text}_fig{number}{panel}" for text, number, panel in texts}
     assert {file.stem for file in STORED.iterdir() if file.is_file()} == names
     note = re.findall(r"^- \[(\w+)\]", (ROOT / "docs/near_optimal.md").read_text("utf-8"), re.M)
     assert set(note).union(*(cited_and_listed(path)[0] for path in LESSONS)) == set(WORKS)

@@ -42,7 +42,7 @@ def figures_are_closed():
 def test_names_and_signatures_agree_with_the_report():
     """Parameters that are not in the report are keyword-only and optional."""
     wanted = {name: words.split(", ") for words, names in SIGNATURES.items() for name in names}
-    assert set(rr.__all__) == set(wanted)
+    assert {x for x in rr.__all__ if not x.startswith("figure_")} == set(wanted)
     for name, words in wanted.items():
         given = inspect.signature(getattr(rr, name)).parameters.values()
         positional = [p for p in given if p.kind == p.POSITIONAL_OR_KEYWORD]

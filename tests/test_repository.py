@@ -246,7 +246,7 @@ NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # each case lists the installed requirements, and the modules that need more
-    "rbcourse": (PROJECT["dependencies"], ["draw", "report"]),
+    "rbcourse": (PROJECT["dependencies"], ["draw", "paper", "report", "__main__"]),
     "rbcourse[draw]": (DRAW, []),
     "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),
     "rbclassroom[grading]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], NEEDS_PAGES),

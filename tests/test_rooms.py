@@ -23,6 +23,8 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbcourse": set(),
     "rbcourse.draw": {"rbcourse"},
     "rbcourse.report": {"rbcourse", "rbcourse.draw"},
+    "rbcourse.paper": {"rbcourse", "rbcourse.draw"},
+    "rbcourse.__main__": {"rbcourse.draw", "rbcourse.paper", "rbcourse.report"},
     "rbclassroom": set(),
     "rbclassroom.figures": {"rbcourse", "rbcourse.draw"},
     "rbclassroom.explorers": {"rbcourse", "rbcourse.draw"}
@@ -42,6 +44,8 @@ LIBRARIES = {
     "rbcourse": {"numpy", "scipy"},
     "rbcourse.draw": {"PIL", "matplotlib", "mpl_toolkits"},
     "rbcourse.report": {"matplotlib"},
+    "rbcourse.paper": {"matplotlib"},
+    "rbcourse.__main__": set(),
     "rbclassroom": set(),
     "rbclassroom.explorers": {"PIL", "anywidget", "ipywidgets", "matplotlib", "traitlets"}
     | {"pooch"},
@@ -128,7 +132,11 @@ def test_the_folders_of_the_package_are_floors():
         {x for x in known if f"{x}.".startswith(f"rbcourse.{name}.")}
         for name in ("curves", "optimum")
     )
-    drawn = {x for x in known if x.startswith(("rbcourse.draw", "rbcourse.report"))}
+    drawn = {
+        x
+        for x in known
+        if x.startswith(("rbcourse.draw", "rbcourse.report", "rbcourse.paper", "rbcourse.__main__"))
+    }
     groups = known.keys() - curves - optimum - drawn
     groups -= {"rbcourse", *(f"rbcourse.{x}" for x in ("closed_forms", "files", "textbook"))}
     assert {x: graph[x] & (curves | optimum) for x in groups if graph[x] & (curves | optimum)} == {}

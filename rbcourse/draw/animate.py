@@ -14,7 +14,7 @@ from PIL import Image
 
 from rbcourse.draw.display import Display, Player
 from rbcourse.draw.pictures import drawn, painter
-from rbcourse.draw.save import Table, caption, csv_text, write_figure
+from rbcourse.draw.save import Table, caption, csv_text, figures_folder, write_figure
 from rbcourse.draw.space import scenes
 from rbcourse.files import replace_file
 
@@ -68,10 +68,8 @@ def animate(
     fig.set_layout_engine("none")  # keeps all artists in place
     display = Display(fig)
     states = [display.record(update(i)) for i in range(frames)]
-    moving = update(still % frames)
-    shown, background = (drawn(fig, moving, artists) for artists in (moving, None))
-    for artist in [*scenes(fig), *moving]:
-        artist.set_animated(False)
+    background = drawn(fig, update(still % frames), None)
+    shown = frame_picture(fig, update, still % frames)
     shares = [f"{round(100 * i / max(1, frames - 1))} %" for i in range(frames)]
     return Animation(
         name,
@@ -134,10 +132,19 @@ def save_animation(
     pictures = {"png": animation.shown}
     if animation.pictures:
         pictures["gif"] = as_gif(animation.pictures, seconds)
-    write_figure(fig, name, table, pictures, pdf)
+    write_figure(fig, name, table, pictures, pdf, figures_folder())
     plt.close(fig)
     files = f"{name}.{'gif, .' * gif}png{', .pdf' * pdf}, .csv"
     return replace(animation, caption=caption(alt, files))
+
+
+def frame_picture(fig: Figure, update: Update, i: int) -> bytes:
+    """Return a PNG of a frame, and leave the figure in this frame."""
+    moving = update(i)
+    picture = drawn(fig, moving, moving)
+    for artist in [*scenes(fig), *moving]:
+        artist.set_animated(False)
+    return picture
 
 
 def render(fig: Figure, update: Update, frames: int) -> list[Image.Image]:

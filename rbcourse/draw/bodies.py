@@ -270,6 +270,35 @@ def describe_moving_boxes(t: Array, motions: Mapping[str, Array]) -> str:
     return said
 
 
+def draw_moving_frame(ax: Any, names: Sequence[str], poses: Array) -> None:
+    """Draw a fixed frame, a moving frame with its body, and the vector between them (BK Fig. 1).
+
+    `names` and `poses`, shape (2, 4, 4), belong to the two frames.
+    """
+    d, R = poses[:, :3, 3], poses[:, :3, :3]
+    draw_box(ax, poses[1], np.array([1.1, 0.8, 0.6])).set_alpha(0.5)
+    for name, origin, axes in zip(names, d, R, strict=True):
+        draw_triad(ax, origin, axes, name, 1.17)
+        ax.text(*(origin + axes @ [0, 0.65, 0.65]), f"{{{name}}}", ha="center", va="center")
+        ax.plot(*origin[:, None], "o", ms=5, color="black", zorder=OVER)
+    draw_arrow(ax, d[0], d[1] - d[0], color=COLOURS["reference"])
+    ax.text(*(d.mean(axis=0) - [0, 0, -0.1]), "$d$", ha="center", va="center")
+    ax.fit(d.min(axis=0) - 0.3, d.max(axis=0) + 1, zoom=1.95)
+    ax.view_init(elev=30, azim=-75)
+
+
+def describe_moving_frame(names: Sequence[str], poses: Array) -> str:
+    """Return a description of the picture of `draw_moving_frame`."""
+    fixed, moving = names
+    place = ", ".join(f"{x:g}" for x in poses[1, :3, 3])
+    turn = np.degrees(angle_between(np.eye(3), poses[1, :3, :3]))
+    return (
+        f"The fixed frame {{{fixed}}} and the frame {{{moving}}} that moves with a body; d is the "
+        "vector from the origin of the first to the origin of the second. The body is a box. The "
+        f"second origin is at ({place}) m, and the second frame is turned by {turn:.0f} degrees."
+    )
+
+
 def draw_triad(ax: Any, origin: Array, R: Array, name: str = "", at: ArrayLike = 1.4) -> None:
     """Draw the columns of R as arrows from `origin`.
 

@@ -122,16 +122,21 @@ def save_figure(
     pdf : bool, optional
         Whether to save the figure also as PDF, for printing.
     """
-    table, content = csv_text(data), io.BytesIO()
-    if fig.get_layout_engine() is None:  # savefig would leave the figure with that of the style
-        fig.set_layout_engine(PlaceHolderLayoutEngine(True, True))
-    fig.savefig(content, format="png")
-    picture = png(Image.open(content))
-    write_figure(fig, name, table, {"png": picture}, pdf)
+    table, picture = csv_text(data), as_png(fig)
+    write_figure(fig, name, table, {"png": picture}, pdf, figures_folder())
     text = caption(alt, f"{name}.png{', .pdf' * pdf}, .csv")
     shown = _turning(fig, name, alt, text) if scenes(fig) else None
     plt.close(fig)
     return shown or Picture(name, alt, text, picture, round(SHOWN * fig.get_figwidth()))
+
+
+def as_png(fig: Figure) -> bytes:
+    """Return a figure as a PNG in 256 colours."""
+    content = io.BytesIO()
+    if fig.get_layout_engine() is None:  # savefig would leave the figure with that of the style
+        fig.set_layout_engine(PlaceHolderLayoutEngine(True, True))
+    fig.savefig(content, format="png")
+    return png(Image.open(content))
 
 
 def _turning(fig: Figure, name: str, alt: str, text: str) -> Player:
@@ -159,13 +164,18 @@ def save_table(name: str, data: Table) -> None:
 
 
 def write_figure(
-    fig: Figure, name: str, table: str, pictures: Mapping[str, bytes], pdf: bool
+    fig: Figure,
+    name: str,
+    table: str,
+    pictures: Mapping[str, bytes],
+    pdf: bool,
+    folder: Path | None,
 ) -> None:
-    """Write the CSV, the pictures and, with `pdf`, the PDF of a figure.
+    """Write the CSV, the pictures and, with `pdf`, the PDF of a figure, if a folder is given.
 
     The keys of `pictures` are endings. All contents are made before the first file is written.
     """
-    if folder := figures_folder():
+    if folder:
         files = {"csv": table.encode(), **pictures}
         if pdf:
             files["pdf"] = as_pdf(fig)

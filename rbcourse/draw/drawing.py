@@ -1,0 +1,163 @@
+"""Figures of the two texts, with their numbers, and the command that draws them into files."""
+
+import argparse
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from rbcourse.draw.animate import Animation, Update, frame_picture, render, save_animation
+from rbcourse.draw.display import Player
+from rbcourse.draw.save import Picture, Table, as_png, csv_text, save_figure, write_figure
+
+SHAPES: Mapping[str, tuple[int, ...]] = {
+    "angles": (-1,),
+    "rotation": (3,),
+    "position": (3,),
+    "sigma": (3,),
+    "w0": (3,),
+    "w1": (3,),
+    "poses": (2, 4, 4),
+    "velocities": (2, 6),
+    "start": (-1,),
+    "goal": (-1,),
+}
+"""The shapes of the parameters that the command takes as numbers; all others are integers."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure of a text, with the numbers that it shows.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+        The figure; of an animation, its last frame.
+    name : str
+        The name of its files without the extension.
+    data : dict of ndarray, all of one shape
+        The plotted numbers by the names of their columns, which end with a unit.
+    alt : str
+        A description, for readers who do not see the figure.
+    moving : tuple of (update, int, float), optional
+        ``update(i)``, which moves the artists to frame i; the number of frames, and their duration
+        in s.
+    """
+
+    figure: Figure
+    name: str
+    data: Table
+    alt: str
+    moving: tuple[Update, int, float] | None = None
+
+    def write(self, folder: str | Path = ".") -> None:
+        """Write the figure as PNG and PDF, and its numbers as CSV; the figure is closed.
+
+        The folder is created if it does not exist.
+        """
+        table = csv_text(self.data)
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        with style():
+            if self.moving is None:
+                picture = as_png(self.figure)
+            else:
+                update, frames, _ = self.moving
+                render(self.figure, update, 0)  # lays out the figure
+                self.figure.set_layout_engine("none")
+                picture = frame_picture(self.figure, update, frames - 1)
+            write_figure(self.figure, self.name, table, {"png": picture}, True, Path(folder))
+        plt.close(self.figure)
+
+    def save(self) -> Picture | Player | Animation:
+        """Write the files of a lesson, and return the figure for the notebook to show.
+
+        The folder is that of `rbcourse.draw.save_figure`. An animation is also written as GIF.
+        """
+        fig, name, data, alt = self.figure, self.name, self.data, self.alt
+        with style():
+            if self.moving is None:
+                return save_figure(fig, name, data, alt, pdf=True)
+            update, frames, seconds = self.moving
+            return save_animation(fig, name, data, alt, update, frames, seconds, pdf=True)
+
+
+def style() -> AbstractContextManager[None]:
+    """Return a context in which Matplotlib has the style of the course."""
+    context: AbstractContextManager[None] = plt.style.context(["default", "rbcourse.rbcourse"])
+    return context
+
+
+def run(
+    module: str, figures: Mapping[str, Callable[..., Drawing]], words: Sequence[str] | None = None
+) -> None:
+    """Draw the figures that a command line names into files.
+
+    Parameters
+    ----------
+    module : str
+        The module, for the help.
+    figures : dict of callable
+        The functions of the figures by their names. Their keyword-only parameters are options.
+    words : list of str, optional
+        The command line, by default that of the program.
+    """
+    options = {name: _options(draw) for name, draw in figures.items()}
+    parser = argparse.ArgumentParser(
+        prog=f"python -m {module}",
+        description="Draw figures as PNG and PDF, and write their numbers as CSV.",
+        epilog="The beginning of a name stands for all names that begin with it. Options replace "
+        "the numbers of the text. Existing files of the same name are replaced.",
+    )
+    parser.add_argument(
+        "figures", nargs="+", metavar="FIGURE", help=f"{', '.join(figures)}, or all of them: all"
+    )
+    parser.add_argument("--folder", default=".", help="the folder of the files (default: this one)")
+    for name in sorted({name for names in options.values() for name in names}):
+        kind: Any = {"nargs": "+", "type": float} if name in SHAPES else {"type": int}
+        known = ", ".join(figure for figure, names in options.items() if name in names)
+        parser.add_argument(f"--{name}", metavar="NUMBER", help=f"of {known}", **kind)
+    given = vars(parser.parse_args(words))
+    asked, folder = given.pop("figures"), given.pop("folder")
+    values = {name: value for name, value in given.items() if value is not None}
+    for word in asked:
+        if word != "all" and not any(name.startswith(word) for name in figures):
+            parser.error(f"FIGURE: one of {', '.join(figures)} or all is wanted, got {word}")
+    for name, draw in figures.items():
+        if not any(word == "all" or name.startswith(word) for word in asked):
+            continue
+        try:
+            if other := values.keys() - options[name]:
+                raise ValueError(f"figure {name} has no option --{min(other)}")
+            drawing = draw(**{key: _shaped(key, value) for key, value in values.items()})
+            drawing.write(folder)
+        except ValueError as error:
+            parser.error(str(error))
+        print(f"{Path(folder, drawing.name)}: png, pdf, csv", flush=True)
+
+
+def _options(draw: Callable[..., Drawing]) -> set[str]:
+    """Return the keyword-only parameters that the command line offers."""
+    fixed = draw.keywords if isinstance(draw, partial) else {}
+    parameters = inspect.signature(draw).parameters.values()
+    return {
+        p.name
+        for p in parameters
+        if p.kind == p.KEYWORD_ONLY and p.name not in fixed and p.name != "plan"
+    }
+
+
+def _shaped(name: str, value: Any) -> Any:
+    if name not in SHAPES:
+        return value
+    try:
+        return np.reshape(value, SHAPES[name])
+    except ValueError:
+        count = int(np.prod(SHAPES[name]))
+        raise ValueError(f"--{name}: {count} numbers are wanted, got {len(value)}") from None
