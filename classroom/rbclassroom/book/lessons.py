@@ -20,7 +20,7 @@ from PIL import Image
 from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.places import relinked, with_keys
 from rbclassroom.book.polls import voted
-from rbclassroom.course.notebooks import lesson_paths, split_sheet
+from rbclassroom.course.notebooks import lesson_paths, shown_figures, split_sheet
 from rbclassroom.explorers import recorded
 from rbcourse.draw.display import ENGINE
 from rbcourse.draw.save import caption
@@ -31,7 +31,7 @@ _PLAYER = re.compile(
     re.DOTALL,
 )
 _DATA = re.compile(r'<script type="application/json">(.*?)</script>', re.DOTALL)
-_SAVED = re.compile(r'save_(?:figure|animation)\(\s*fig,\s*"(\w+)"')
+_SAVED = re.compile(r"save_(figure|animation)\(|\.save\(\)")
 _SHEET = re.compile(r"; the lecturer's (run sheets?) (?:is|are) at the end")
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
 _LESSON = re.compile(r"`[^`]*`|\$[^$]*\$|\[[^\]]*\]\([^)]*\)|<[^>]*>|\b(lesson (\d+))\b")
@@ -62,12 +62,13 @@ def figures_of(lesson: str, notebook: NotebookNode) -> list[Figure]:
     for cell in notebook.cells:
         if heading := re.match(r"## (?:(\d+) ·|(.*))", cell.source):
             section = heading[1] or heading[2]
-        if cell.cell_type == "code" and (saved := _SAVED.search(cell.source)):
-            name, texts = saved[1], [o.data["text/plain"] for o in cell.outputs if "data" in o]
-            shown = [t.partition(": ")[2] for t in texts if t.startswith(f"{name}: ")]
+        if cell.cell_type == "code" and _SAVED.search(cell.source):
+            shown = shown_figures(cell)
             if not shown:
-                raise ValueError(f"{lesson}: {name} has no stored output")
-            found.append(Figure(name, f"{lesson}, {section}", shown[0]))
+                line = cell.source.splitlines()[-1].strip()
+                raise ValueError(f"{lesson}: the figure of {line!r} has no stored output")
+            place = f"{lesson}, {section}"
+            found += [Figure(name, place, text) for name, text in shown.items()]
     return found
 
 

@@ -39,6 +39,13 @@ def lesson_paths(folder: Path) -> list[Path]:
     return sorted(folder.glob("[0-9][0-9]_*.ipynb"))
 
 
+def shown_figures(cell: NotebookNode) -> dict[str, str]:
+    """Return the descriptions of the figures in the outputs of a cell, by their names."""
+    texts = [output.get("data", {}).get("text/plain", "") for output in cell.outputs]
+    figures = (re.fullmatch(r"((?:lesson\d\d|paper|report)_\w+): (.+)", text) for text in texts)
+    return {figure[1]: figure[2] for figure in figures if figure}
+
+
 def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
     """Return the cells for the class, and the text of the run sheet, which has the answers."""
     for i, cell in enumerate(notebook.cells):

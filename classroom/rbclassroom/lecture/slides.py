@@ -16,7 +16,7 @@ import nbformat
 from nbformat import NotebookNode
 from PIL import Image
 
-from rbclassroom.course.notebooks import split_sheet
+from rbclassroom.course.notebooks import shown_figures, split_sheet
 from rbclassroom.explorers import recorded
 
 BEHIND = ("Exercises", "Misprints", "References")
@@ -118,8 +118,9 @@ class _Reader:
         if cell.cell_type == "markdown":
             self.read_text(cell.source, wish)
         elif wish:
-            figures = re.findall(r'save_\w+\(\s*fig, "[a-z0-9]+_(\w+)"', cell.source)
-            self.names |= {name.replace("fig", "figure "): len(self.shown) for name in figures}
+            for figure in shown_figures(cell):
+                name = figure.partition("_")[2].replace("fig", "figure ")
+                self.names[name] = len(self.shown)
             self.put_text(wish)
             last = self.shown[-1]
             if not last.picture:  # a sketch can replace the figure

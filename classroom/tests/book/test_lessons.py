@@ -94,7 +94,7 @@ def test_the_figures_of_a_lesson_are_listed_with_their_sections():
     place = "01_plane.ipynb, 3"
     assert figure == lessons.Figure("lesson01_way", place, "A way.")
     drawn.outputs.clear()
-    with pytest.raises(ValueError, match=r"01_plane\.ipynb: lesson01_way has no stored output"):
+    with pytest.raises(ValueError, match=r"01_plane\.ipynb: the figure of 'fig, .* has no stored"):
         lessons.figures_of("01_plane.ipynb", new_notebook(cells=cells))
 
 
