@@ -5,6 +5,7 @@ import importlib.metadata
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -13,7 +14,9 @@ from pathlib import Path
 from textwrap import dedent
 from zipfile import ZipFile
 
+import numpy as np
 import pytest
+import recording
 import yaml
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -23,6 +26,7 @@ import course
 import rbclassroom
 import rbcourse
 from rbclassroom.course import lab, options
+from rbcourse.draw.drawing import SHAPES
 
 ROOT = Path(__file__).parents[1]
 PROJECT, CLASSROOM = (
@@ -36,6 +40,7 @@ EXTRAS = {  # each list has these extras of rbcourse and rbcourse-classroom
     "tests/environment-test.txt": (["test", "lint"], ["browser"]),
 }
 NAMES = list(EXTRAS)
+WITH_CODE = "conventions", "museum", "recording"
 LISTS = {name: (ROOT / name).read_text("utf-8").splitlines() for name in NAMES}
 PINS = {
     name: [Requirement(line.partition("#")[0]) for line in lines if line[0] not in "#-"]
@@ -85,14 +90,27 @@ def test_each_list_has_all_requirements(name):
     assert needed <= there | {"pip"}
 
 
-@pytest.mark.parametrize("document", ["README.md", "docs/conventions.md", "docs/museum.md"])
+@pytest.mark.parametrize("document", ["README.md", *(f"docs/{x}.md" for x in WITH_CODE)])
 def test_examples_in_documents_run(document, tmp_path, monkeypatch):
     """The examples write their files to another folder."""
+    shutil.copy(ROOT / "docs/recording.txt", tmp_path)
     monkeypatch.chdir(tmp_path)
     options = {"optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}
     failed, tried = doctest.testfile(str(ROOT / document), module_relative=False, **options)
     assert tried > 5
     assert not failed
+
+
+def test_the_example_of_a_recording_is_made_by_its_script():
+    """Another processor may round a number in its last digit."""
+    stored, made = read("docs/recording.txt").splitlines(), recording.recording().splitlines()
+    assert len(stored) == len(made) == 4001
+    for one, other in zip(stored, made, strict=True):
+        if one != other:
+            assert (
+                np.abs(np.subtract(*(np.array(x.split(), float) for x in (one, other)))).max()
+                < 2e-7
+            )
 
 
 def test_binder_and_the_citation_agree_with_the_package():
@@ -314,5 +332,6 @@ def test_tasks_and_options_in_documents_exist():
     known = {"--depth", "--install", "--privileged"}  # of git, wsl and docker
     for task in course.TASKS:
         known.update(*(action.option_strings for action in options.parser(task)._actions))
-    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) <= known
+    known |= {"--folder", *(f"--{name}" for name in SHAPES)}  # of python -m rbcourse.paper
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text)) <= known
     assert set(re.findall(r"course\.py ([a-z]+)", text)) <= set(course.TASKS)

@@ -22,7 +22,7 @@ MISTAKES = {
 def found(tmp_path_factory):
     """Return the messages of mypy --strict on the examples and on the mistakes, by file."""
     folder = tmp_path_factory.mktemp("types")
-    for document in ("README.md", "docs/conventions.md"):
+    for document in ("README.md", "docs/conventions.md", "docs/recording.md"):
         text = (ROOT / document).read_text(encoding="utf-8")
         examples = "".join(each.source for each in doctest.DocTestParser().get_examples(text))
         name = Path(document).stem + "_examples.py"
