@@ -105,8 +105,8 @@ def random_samples(n, rng, kind, form, name):
     convert = getattr(Rotation, f"as_{form}")
     yield OURS, lambda: getattr(rb, f"sample_{kind}")(n, rng=rng)
     yield "textbook", lambda: getattr(textbook, f"sample_{kind}")(n, rng)
-    yield "SciPy", lambda: convert(Rotation.random(n, rng=rng))
-    yield "SciPy, as Rotation", lambda: Rotation.random(n, rng=rng)
+    yield "SciPy", lambda: convert(Rotation.random(n, rng))
+    yield "SciPy, as Rotation", lambda: Rotation.random(n, rng)
     if roma:
         yield "RoMa", partial(getattr(roma, name), n, dtype=torch.float64)
 

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import as_single, check_all
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array
+from rbcourse._valid import as_poses
 from rbcourse.curves.projected import projected_cubic
 from rbcourse.draw import bodies, coordinates, families
 from rbcourse.draw.drawing import Drawing, run, style
@@ -183,7 +184,9 @@ def figure_5(
     >>> plt.close(drawing.figure)
     """
     _one_of("panel", panel, "ab")
-    ends = as_single("poses", poses, 2, 4, 4), as_single("velocities", velocities, 2, 6)
+    ends = as_poses("poses", poses), as_single("velocities", velocities, 2, 6)
+    if ends[0].shape != (2, 4, 4):
+        raise ValueError(f"poses: shape (2, 4, 4) is wanted, got {ends[0].shape}")
     best, near = (make(*ends[0], *ends[1]) for make in (minimum_acceleration, projected_cubic))
     motion, t = best if panel == "a" else near, np.linspace(0, 1, 106)
     drawn = t[::15]

@@ -3,6 +3,10 @@
 from itertools import product
 
 import numpy as np
+from scipy.spatial import transform
+
+RigidTransform = getattr(transform, "RigidTransform", None)
+"""The class of SciPy, or None before SciPy 1.16."""
 
 AXES = np.array([a for a in product([-1, 0, 1], repeat=3) if any(a)], dtype=float)
 """The 26 directions to the faces, edges and corners of a cube. They are not normalised."""

@@ -31,7 +31,7 @@ COSTS = {
 
 
 def with_inertias(moments, rng):
-    axes = Rotation.random(len(moments), rng=rng).as_matrix()
+    axes = Rotation.random(len(moments), rng).as_matrix()
     G = axes @ (moments[:, :, None] * axes.mT)
     return (G + G.mT) / 2
 
@@ -46,7 +46,7 @@ def random_problems(count, seed, turn=3.0, speed=9.0):
     vectors *= rng.random((5, count, 1)) / np.linalg.norm(vectors, axis=-1, keepdims=True)
     sigma, w0, w1, a0, a1 = np.reshape([turn, speed, speed, 20, 20], (5, 1, 1)) * vectors
     moments = 1 + rng.random((count, 3)) * [0, 1, 1.9]
-    R0 = Rotation.random(count, rng=rng).as_matrix()
+    R0 = Rotation.random(count, rng).as_matrix()
     return [R0, R0 @ rb.exp_so3(sigma), w0, w1, with_inertias(moments, rng), a0, a1]
 
 

@@ -37,7 +37,7 @@ def directions(count, rng):
 def ends(count, angle=None, size=None):
     """Return random R0, R1, w0, w1; `angle` and `size` fix the turn and the speeds."""
     rng = np.random.default_rng(count)
-    R0, R1 = (Rotation.random(count, rng=rng).as_matrix() for _ in range(2))
+    R0, R1 = (Rotation.random(count, rng).as_matrix() for _ in range(2))
     if angle is not None:
         R1 = R0 @ Rotation.from_rotvec(angle * directions(count, rng)).as_matrix()
     sizes = rng.uniform(0, 9, (2, count, 1)) if size is None else (size, size)
@@ -204,7 +204,7 @@ CASES = cases()
 def test_curves_and_derivatives_agree_with_the_definition(name, case):
     """Errors of Cayley's parameters grow with the secant of half the angle: near a half-turn, all
     digits are lost."""
-    (turn, w0, w1), start, times = CASES[case], Rotation.random(rng=1).as_matrix(), (0.13, 0.6, 1)
+    (turn, w0, w1), start, times = CASES[case], Rotation.random(None, 1).as_matrix(), (0.13, 0.6, 1)
     curve = MAKERS[name](start, start @ oracles.exp_so3(turn), w0, w1)
     R, *rates = exactly(name, CASES[case], times)
     worse = 1 / np.cos(np.linalg.norm(turn) / 2) if name == "cayley" else 1
@@ -324,7 +324,7 @@ def test_a_zero_of_the_quaternion_cubic_is_refused():
 
 BOOK = rb.Body(np.diag([1.0, 2.22, 3.18]))
 RNG = np.random.default_rng(5)
-R0 = Rotation.random(6, rng=RNG).as_matrix()
+R0 = Rotation.random(6, RNG).as_matrix()
 TURN, W0, W1, A0, A1 = RNG.normal(size=(5, 6, 3)) * np.reshape([0.6, 1.5, 1.5, 4, 4], (5, 1, 1))
 R1 = R0 @ rb.exp_so3(TURN)
 TIMES = np.linspace(0, 1, 51)

@@ -13,7 +13,7 @@ from rbcourse.straight_line import f
 
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(61)
-STARTS = Rotation.random(30, rng=RNG).as_matrix()
+STARTS = Rotation.random(30, RNG).as_matrix()
 TIMES = np.linspace(0, 1, 9)
 ANGLES = np.concatenate(
     [RNG.uniform(0, 3.1, 22), 10.0 ** -np.array([1, 3, 6, 9, 12]), [0, 3.14, 3.1415]]

@@ -22,7 +22,7 @@ TURNS = {"R", "R0", "R1", "S"}
 
 def exported():
     """Return all functions that the package and its modules export, by name."""
-    others = {"draw", "report", "textbook"}
+    others = {"__main__", "draw", "paper", "report", "textbook"}
     names = {part.name for part in pkgutil.iter_modules(rb.__path__)} - others
     modules = [rb, *(importlib.import_module(f"rbcourse.{name}") for name in sorted(names))]
     listed = {name: getattr(m, name) for m in modules for name in getattr(m, "__all__", ())}

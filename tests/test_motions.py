@@ -12,7 +12,7 @@ EPS = np.finfo(float).eps
 RNG, FORMS = np.random.default_rng(63), rb.closed_forms.FORMS.values()
 N = 8
 A0, A1 = (
-    rb.pose_from_components(Rotation.random(N, rng=RNG).as_matrix(), 3 * RNG.normal(size=(N, 3)))
+    rb.pose_from_components(Rotation.random(N, RNG).as_matrix(), 3 * RNG.normal(size=(N, 3)))
     for _ in range(2)
 )
 RATES = RNG.normal(size=(4, N, 3))
@@ -153,7 +153,7 @@ def test_displacements_that_turn_only_by_rounding_errors_are_translations():
     still = rb.screw_from_pose(np.eye(4))
     assert not np.any([*still.axis, *still.point, still.angle, still.slide])
     assert np.isnan(still.pitch)
-    B, C = Rotation.random(400, rng=RNG).as_matrix().reshape(2, 200, 3, 3)
+    B, C = Rotation.random(400, RNG).as_matrix().reshape(2, 200, 3, 3)
     rounded = B @ (B.mT @ C) @ C.mT
     assert np.abs(rb.log_so3(rounded)).max() > 0
     exact = [(np.eye(3), size, 4 * EPS) for size in (1e-300, 1e-170, 1, 1e170, 1e300)]

@@ -123,7 +123,7 @@ def test_a_round_body_has_the_optimum_of_a_ball(what, size):
 @pytest.mark.parametrize("shares", [(1, 1), (0, 0), (2, 0.5), (0, 3), (-0.3, 1.5)])
 def test_the_optimum_of_turns_about_a_principal_axis_is_a_cubic(what, shares):
     """All axes of a ball are principal axes."""
-    frame, R0 = Rotation.random(2, rng=4).as_matrix()
+    frame, R0 = Rotation.random(2, 4).as_matrix()
     moments, angle = np.array([1.0, 2.2, 2.9]), 1.3 if what in ("acceleration", "torque") else 1.96
     G = (frame * moments) @ frame.T
     p, (j, k) = CubicHermiteSpline([0, 1], [0, 1], shares), shares

@@ -139,7 +139,7 @@ def test_fast_spins_about_one_axis_have_the_cheapest_number_of_turns(speed):
     """No cubic p(t) that ends at σ plus full turns may cost less than the optimum."""
     rng, count = np.random.default_rng(speed), 30 if speed < 30 else 8
     sigma, k0 = (rng.uniform(-np.pi, np.pi, count), rng.uniform(speed - 5, speed + 5, count))
-    k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(rng=rng).as_matrix()[0])
+    k1, axis = (k0 + rng.uniform(-0.5, 0.5, count), Rotation.random(None, rng).as_matrix()[0])
     turn, *rates = (x[:, None] * axis for x in (sigma, k0, k1))
     curve = rb.minimum_acceleration(I3, rb.exp_so3(turn), *rates)
     angles = sigma + 2 * np.pi * np.arange(-12, 13)[:, None]

@@ -147,6 +147,8 @@ def test_the_curves_of_a_family_have_the_colours_of_its_surface():
     assert [line.get_label() for line in ax.lines] == list(rows)
     assert len({str(line._dash_pattern) for line in ax.lines}) == 4
     families.draw_surface(space, table)
+    if not hasattr(space.collections[0], "_faces"):
+        pytest.skip("the corners of surfaces are new in Matplotlib 3.10")
     faces = np.array([face[:4] for face in space.collections[0]._faces])
     for line, row in zip(ax.lines[:3], rows.values(), strict=False):
         chosen = faces[..., 1].min(axis=1) == angle[row, 0]

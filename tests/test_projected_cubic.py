@@ -20,7 +20,7 @@ from rbcourse.curves.projected import (
 EPS = np.finfo(float).eps
 RNG = np.random.default_rng(62)
 N = 60
-R0, R1 = (Rotation.random(N, rng=RNG).as_matrix() for _ in range(2))
+R0, R1 = (Rotation.random(N, RNG).as_matrix() for _ in range(2))
 W0, W1, B0, B1 = 4 * RNG.normal(size=(4, N, 3))
 TIMES, I3, REST = np.linspace(0, 1, 41), np.eye(3), np.zeros(3)
 CUBICS = rb.projected_cubic(R0, R1, W0, W1)
@@ -161,7 +161,7 @@ def ends_with_a_jump(count, rng, miss=0.0):
     k1, sign = rng.uniform(-40, 40, count), rng.choice([-1, 1], count)
     k0 = sign * np.sqrt((h01**2 + (k1 * h11) ** 2 - (h00 - miss) ** 2) / h10**2)
     a = np.angle(-(h00 - miss + 1j * k0 * h10) / (h01 + 1j * k1 * h11))
-    L, Q = (Rotation.random(count, rng=rng).as_matrix() for _ in "LQ")
+    L, Q = (Rotation.random(count, rng).as_matrix() for _ in "LQ")
     z = np.eye(3)[2]
     turn = L @ rb.exp_so3(a[:, None] * z) @ Q
     return L @ Q, turn, *(k[:, None] * (Q.mT @ z) for k in (k0, k1))
@@ -170,7 +170,7 @@ def ends_with_a_jump(count, rng, miss=0.0):
 def test_the_margin_is_at_least_its_bound():
     """The bound is the margin for turns about one axis with w0 = w1 against the turn."""
     rng, count = np.random.default_rng(77), 600
-    start, axis = Rotation.random(count, rng=rng).as_matrix(), rng.normal(size=(count, 3))
+    start, axis = Rotation.random(count, rng).as_matrix(), rng.normal(size=(count, 3))
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     angle = np.pi * (1 - 10.0 ** rng.uniform(-9, -0.03, (count, 1)))
     goal, fastest = start @ rb.exp_so3(angle * axis), 4 / np.tan(angle / 2)

@@ -135,7 +135,7 @@ def test_uniform_rotations_pass_the_tests():
     for R in (
         ours,
         rb.matrix_from_quaternion(rb.sample_quaternion(4 * count, rng=1)),
-        Rotation.random(count, rng=3).as_matrix(),
+        Rotation.random(count, 3).as_matrix(),
         ours[:count] @ np.diag([1, -1, -1]),
         # half of the quaternions suffice, since q and −q are one rotation
         by_shoemake(rng.random((count, 3)) * [1, 0.5, 1]),

@@ -2,7 +2,7 @@ import awkward
 import numpy as np
 import oracles
 import pytest
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 
@@ -10,9 +10,11 @@ EPS = np.finfo(float).eps
 RNG = np.random.default_rng(31)
 TURNS = awkward.ROTATION_VECTORS
 TWISTS = np.concatenate([TURNS, RNG.normal(size=TURNS.shape)], axis=-1)
-POSES = RigidTransform.from_components(
-    5 * RNG.normal(size=(40, 3)), Rotation.random(40, rng=RNG)
-).as_matrix()
+POSES = np.tile(np.eye(4), (40, 1, 1))
+POSES[:, :3, 3], POSES[:, :3, :3] = (
+    5 * RNG.normal(size=(40, 3)),
+    Rotation.random(40, RNG).as_matrix(),
+)
 SIZES = 1 + np.linalg.norm(POSES[:, :3, 3], axis=-1)[:, None, None]
 
 
@@ -42,8 +44,9 @@ def test_exp_agrees_with_the_power_series_and_scipy():
     A = rb.pose_from_components(matrices, [1.0, -2.0, 3.0])
     assert np.abs(rb.exp_se3(rb.log_se3(A)) - A).max() < 40 * EPS
     assert np.array_equal(rb.log_se3(A)[:, :3], rb.log_so3(matrices))
-    theirs = RigidTransform.from_exp_coords(TWISTS)
-    assert np.abs(rb.exp_se3(TWISTS) - theirs.as_matrix()).max() < 1e-13
+    if awkward.RigidTransform:
+        theirs = awkward.RigidTransform.from_exp_coords(TWISTS)
+        assert np.abs(rb.exp_se3(TWISTS) - theirs.as_matrix()).max() < 1e-13
 
 
 @pytest.mark.source("BK (1)", "BK 2.1")

@@ -125,7 +125,7 @@ def test_the_jacobian_equals_its_integral():
 
 @pytest.mark.source("BK 6.1")
 def test_the_angle_between_rotations_agrees_with_scipy():
-    R, S = Rotation.random(40, rng=5).as_matrix().reshape(2, 20, 3, 3)
+    R, S = Rotation.random(40, 5).as_matrix().reshape(2, 20, 3, 3)
     want = (Rotation.from_matrix(R).inv() * Rotation.from_matrix(S)).magnitude()
     assert np.abs(rb.angle_between(R, S) - want).max() < 16 * EPS
     assert rb.angle_between(np.eye(3), np.diag([1.0, -1, -1])) == np.pi

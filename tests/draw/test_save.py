@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from broken_disk import check_all_or_nothing
+from matplotlib import font_manager
 
 from rbcourse.draw import animate, save
 
@@ -74,6 +75,7 @@ save_figure(fig, "line", {}, "a line", pdf=True)
 """
 
 
+@pytest.mark.skipif(not hasattr(font_manager, "FontPath"), reason="new in Matplotlib 3.11")
 def test_a_pdf_is_the_same_wherever_the_fonts_are(tmp_path, monkeypatch):
     """A new process finds the fonts of texts and formulas in folders whose names are exchanged."""
     ours, theirs = save.__file__, plt.matplotlib.get_data_path()

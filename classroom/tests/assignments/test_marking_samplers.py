@@ -24,7 +24,7 @@ def draws(law, n, rng):
     if law == "direction":
         points = rng.normal(size=(n, 3))
         return points / np.linalg.norm(points, axis=1, keepdims=True)
-    turns = Rotation.random(n, rng=rng)
+    turns = Rotation.random(n, rng)
     return turns.as_matrix() if law == "rotation" else turns.as_quat(scalar_first=True)
 
 
