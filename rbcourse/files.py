@@ -113,7 +113,7 @@ def write_path(
             raise ValueError(f"path: a single curve is wanted, got a stack {path.batch_shape}")
         path, *rates = path.state(as_single("times", times, "N"))
         velocities, accelerations = (None, None) if tum else rates
-    times, poses, velocities = check_path(times, path, velocities)
+    times, poses, velocities = check_path(times, path, velocities, "path")
     if accelerations is not None:
         if velocities is None:
             raise ValueError("accelerations: they need velocities, which come before them")
@@ -130,7 +130,7 @@ def write_path(
         if velocities is not None:
             raise ValueError(f"velocities: TUM has no columns for them; {file} must end in .csv")
         if not d.size:
-            raise ValueError(f"poses: TUM cannot store rotations alone; {file} must end in .csv")
+            raise ValueError(f"path: TUM cannot store rotations alone; {file} must end in .csv")
         table, header = np.column_stack([times, d, np.roll(q, -1, axis=-1)]), "timestamp tx ty tz"
         _write_table(file, f"# {header} qx qy qz qw", " ", table)
         return

@@ -263,23 +263,23 @@ def twist_from_rates(A: ArrayLike, w: ArrayLike, d_dot: ArrayLike) -> Array:
 
 
 def check_path(
-    times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
+    times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None, name: str = "poses"
 ) -> tuple[Array, Array, Array | None]:
     """Check a path; return its times, its poses or rotations, and its velocities or None.
 
     ValueError names the first wrong shape, the first time that does not increase, or the first
-    invalid matrix.
+    invalid matrix. `name` is the name of the argument with the poses.
     """
     if np.size(times) == 0:
-        raise ValueError("times, poses: one or more are wanted, got none")
+        raise ValueError(f"times, {name}: one or more are wanted, got none")
     times = as_single("times", times, "N")
-    poses, _ = as_rotations_or_poses("poses", poses)
+    poses, _ = as_rotations_or_poses(name, poses)
     size = poses.shape[-1]
     if poses.ndim != 3:
-        raise ValueError(f"poses: shape (N, 4, 4) or (N, 3, 3) is wanted, got {poses.shape}")
+        raise ValueError(f"{name}: shape (N, 4, 4) or (N, 3, 3) is wanted, got {poses.shape}")
     if len(times) != len(poses):
         raise ValueError(
-            f"times, poses: equal numbers are wanted, got {len(times)} and {len(poses)}"
+            f"times, {name}: equal numbers are wanted, got {len(times)} and {len(poses)}"
         )
     late = np.flatnonzero(times[1:] <= times[:-1])
     if len(late):

@@ -152,13 +152,13 @@ TWO, MOVES = [0, 1], TWISTS[:2]
 REFUSED = {
     rb.write_path: [
         ("a.tum", (TWO, POSES[:2], MOVES), r"velocities: TUM has no columns .*\.csv$"),
-        ("a.txt", (TWO, ROTATIONS[:2]), r"poses: TUM cannot store rotations alone; .*csv$"),
+        ("a.txt", (TWO, ROTATIONS[:2]), r"path: TUM cannot store rotations alone; .*csv$"),
         ("a.dat", (TWO, POSES[:2]), r"file: a name .* in \.csv, \.tum or .*, got .*dat"),
         ("a.csv", ([1, 0], POSES[:2]), r"times\[1\] is 0.0, a time after 1.0 is wanted"),
-        ("a.csv", ([0], POSES[:2]), "times, poses: equal numbers are wanted, got 1 and 2"),
-        ("a.csv", ([], POSES[:0]), "times, poses: one or more are wanted, got n"),
-        ("a.csv", (TWO, 2 * POSES[:2]), r"poses\[0\] is not a pose: its last row is"),
-        ("a.csv", (TWO, POSES[:2, :2]), "poses: shape"),
+        ("a.csv", ([0], POSES[:2]), "times, path: equal numbers are wanted, got 1 and 2"),
+        ("a.csv", ([], POSES[:0]), "times, path: one or more are wanted, got n"),
+        ("a.csv", (TWO, 2 * POSES[:2]), r"path\[0\] is not a pose: its last row is"),
+        ("a.csv", (TWO, POSES[:2, :2]), "path: shape"),
         ("a.csv", (TWO, POSES[:2], MOVES[:, :3]), "velocities: shape"),
         ("a.csv", (TWO, POSES[:2], MOVES * np.nan), r"velocities\[0, 0\] is nan"),
     ],
