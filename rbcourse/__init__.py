@@ -28,7 +28,8 @@ find out whether an optimum is a minimum     c.certified
 follow a path in the least time              fastest; limits_used for the use of each limit
 read and write paths                         read_path, write_path
 draw                                         draw.profiles, and the module draw
-draw a figure of BK or RR again              paper.figure_1 to figure_5, report.figure_4 to figure_9
+draw the figures of BK and RR                paper.figure_1, ..., report.figure_4, ...; in a
+                                             terminal: python -m rbcourse all
 
 The modules closed_forms, quaternion, metrics, connection, planar, arm, sampling, straight_line,
 optimum, files, textbook (short versions of the main algorithms), paper, report and draw have more.

@@ -1,13 +1,13 @@
 """The figures of BK, each as a function whose defaults are the numbers of the paper.
 
 A function returns a `Drawing`: its ``figure`` is a Matplotlib figure, its ``data`` are the plotted
-numbers, and its ``save()`` writes PNG, PDF and CSV. ``python -m rbcourse.paper --help`` explains
-the command, which draws figures into files, such as
-``python -m rbcourse.paper 4c --w1 0.5 1 7 --folder mine``.
+numbers, and ``figure_4(w1=[0.5, 1, 7]).write("mine")`` writes PNG, PDF and CSV to the folder
+``mine``. The command ``python -m rbcourse.paper 4c --w1 0.5 1 7 --folder mine`` does the same, and
+``python -m rbcourse all --folder mine`` draws every figure of both texts.
 
 Parameters
 ----------
-panel : {"a", "b", "c"}, optional
+panel : {"a", "b"}, optional
     The panel of the figure.
 angles : array_like, shape (n,), optional
     Two or more increasing angles in rad, above 0 and below π.
@@ -130,6 +130,8 @@ def figure_4(
 
     Parameters
     ----------
+    panel : {"a", "b", "c"}, optional
+        The panel of the figure, which determines `w1`.
     sigma : array_like, shape (3,), optional
         The rotation vector of the goal, in rad.
     w0, w1 : array_like, shape (3,), optional

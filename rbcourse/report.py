@@ -3,10 +3,9 @@
 `figure_4` to `figure_9` are the figures 4 to 9 of the report; their defaults are the numbers of the
 lessons, since the report prints no numbers for them. A function returns a
 `rbcourse.draw.drawing.Drawing`: its ``figure`` is a Matplotlib figure, its ``data`` are the plotted
-numbers, and its ``save()`` writes PNG, PDF, CSV and GIF. ``python -m rbcourse.report --help``
-explains the command, which draws figures into files, such as
-``python -m rbcourse.report 4 --rng 7 --folder mine``. `visualize` and the other functions of the
-report draw any sample and any path.
+numbers, and ``figure_4(rng=7).write("mine")`` writes PNG, PDF and CSV to the folder ``mine``. The
+command ``python -m rbcourse.report 4 --rng 7 --folder mine`` does the same. `visualize` and the
+other functions of the report draw any sample and any path.
 
 Arguments that the report does not have are keyword-only. For inputs of a wrong shape or with
 non-finite entries, a check returns False, and a correction raises ValueError.

@@ -96,7 +96,7 @@ def test_bad_arguments_are_named(draw, options, message):
 
 
 def test_the_command_draws_figures_into_files(tmp_path, capsys):
-    words = ["4c", "--w1", "0.5", "-1", "7", "--folder", str(tmp_path / "mine")]
+    words = ["--w1", "0.5", "-1", "7", "4c", "--folder", str(tmp_path / "mine")]
     run("rbcourse.paper", paper.FIGURES, words)
     assert "paper_fig4c: png, pdf, csv" in capsys.readouterr().out
     files = sorted(path.name for path in (tmp_path / "mine").iterdir())
@@ -110,7 +110,8 @@ def test_the_command_draws_figures_into_files(tmp_path, capsys):
     for words, message in {
         "6 --folder x": "FIGURE: one of 1, 2a, .*5b or all is wanted, got 6",
         "2a --w1 1 2 3": "figure 2a has no option --w1",
-        "4c --w1 1 2": "--w1: 3 numbers are wanted, got 2",
+        "4c --w1 1 2": "argument --w1: expected 3 arguments",
+        "5a --velocities 1 2 3": "--velocities: 12 numbers are wanted, got 3",
         "2a --angles 1": "angles: two or more increasing",
     }.items():
         with pytest.raises(SystemExit):

@@ -26,7 +26,7 @@ import course
 import rbclassroom
 import rbcourse
 from rbclassroom.course import lab, options
-from rbcourse.draw.drawing import SHAPES
+from rbcourse.draw.drawing import OPTIONS
 
 ROOT = Path(__file__).parents[1]
 PROJECT, CLASSROOM = (
@@ -332,6 +332,6 @@ def test_tasks_and_options_in_documents_exist():
     known = {"--depth", "--install", "--privileged"}  # of git, wsl and docker
     for task in course.TASKS:
         known.update(*(action.option_strings for action in options.parser(task)._actions))
-    known |= {"--folder", *(f"--{name}" for name in SHAPES)}  # of python -m rbcourse.paper
+    known |= {"--folder", *(f"--{name}" for name in OPTIONS)}  # of python -m rbcourse.paper
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text)) <= known
     assert set(re.findall(r"course\.py ([a-z]+)", text)) <= set(course.TASKS)

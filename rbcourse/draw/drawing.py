@@ -17,19 +17,22 @@ from rbcourse.draw.animate import Animation, Update, frame_picture, render, save
 from rbcourse.draw.display import Player
 from rbcourse.draw.save import Picture, Table, as_png, csv_text, save_figure, write_figure
 
-SHAPES: Mapping[str, tuple[int, ...]] = {
-    "angles": (-1,),
-    "rotation": (3,),
-    "position": (3,),
-    "sigma": (3,),
-    "w0": (3,),
-    "w1": (3,),
-    "poses": (2, 4, 4),
-    "velocities": (2, 6),
-    "start": (-1,),
-    "goal": (-1,),
+OPTIONS: Mapping[str, tuple[tuple[int, ...], str]] = {
+    "angles": ((-1,), "two or more increasing angles, in rad"),
+    "rotation": ((3,), "the rotation vector of the moving frame, in rad"),
+    "position": ((3,), "the origin of the moving frame, in m"),
+    "sigma": ((3,), "the rotation vector of the goal, in rad"),
+    "w0": ((3,), "the angular velocity at the start"),
+    "w1": ((3,), "the angular velocity at the goal"),
+    "poses": ((2, 4, 4), "two matrices, row by row"),
+    "velocities": ((2, 6), "two twists (w, v) in the body frame"),
+    "start": ((-1,), "x, y and the heading, or the joint angles, in m and rad"),
+    "goal": ((-1,), "the same at the end"),
+    "length": ((), "the length of the rectangle, in m"),
+    "rng": ((), "the seed of the sample"),
+    "steps": ((), "the number of rotations, or of steps"),
 }
-"""The shapes of the parameters that the command takes as numbers; all others are integers."""
+"""The shape and the meaning of each option of the command."""
 
 
 @dataclass(frozen=True)
@@ -111,18 +114,22 @@ def run(
     options = {name: _options(draw) for name, draw in figures.items()}
     parser = argparse.ArgumentParser(
         prog=f"python -m {module}",
+        usage=f"python -m {module} FIGURE [FIGURE ...] [--folder FOLDER] [options]",
         description="Draw figures as PNG and PDF, and write their numbers as CSV.",
-        epilog="The beginning of a name stands for all names that begin with it. Options replace "
-        "the numbers of the text. Existing files of the same name are replaced.",
+        epilog="A name without its last letter stands for all its panels. Options replace the "
+        "numbers of the text. Existing files of the same name are replaced.",
     )
     parser.add_argument(
         "figures", nargs="+", metavar="FIGURE", help=f"{', '.join(figures)}, or all of them: all"
     )
     parser.add_argument("--folder", default=".", help="the folder of the files (default: this one)")
     for name in sorted({name for names in options.values() for name in names}):
-        kind: Any = {"nargs": "+", "type": float} if name in SHAPES else {"type": int}
+        shape, meaning = OPTIONS[name]
         known = ", ".join(figure for figure, names in options.items() if name in names)
-        parser.add_argument(f"--{name}", metavar="NUMBER", help=f"of {known}", **kind)
+        kind: dict[str, Any] = {"type": int if name in ("rng", "steps") else float}
+        if shape:
+            kind["nargs"] = 3 if shape == (3,) else "+"
+        parser.add_argument(f"--{name}", metavar="X", help=f"{meaning} ({known})", **kind)
     given = vars(parser.parse_args(words))
     asked, folder = given.pop("figures"), given.pop("folder")
     values = {name: value for name, value in given.items() if value is not None}
@@ -154,10 +161,7 @@ def _options(draw: Callable[..., Drawing]) -> set[str]:
 
 
 def _shaped(name: str, value: Any) -> Any:
-    if name not in SHAPES:
-        return value
-    try:
-        return np.reshape(value, SHAPES[name])
-    except ValueError:
-        count = int(np.prod(SHAPES[name]))
-        raise ValueError(f"--{name}: {count} numbers are wanted, got {len(value)}") from None
+    shape, _ = OPTIONS[name]
+    if shape and -1 not in shape and len(value) != (count := int(np.prod(shape))):
+        raise ValueError(f"--{name}: {count} numbers are wanted, got {len(value)}")
+    return np.reshape(value, shape) if shape else value
