@@ -9,7 +9,7 @@ import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from decimal import Context, Decimal
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,15 +56,29 @@ _UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.spl
 _MEANINGS = {
     "nanoseconds": r"(.*_)?(nsec|nsecs|nanosec|nanosecs|nanoseconds)",
     "time": r"(.*_)?(time|times|timestamp|timestamps|stamp|t|sec|secs|seconds)",
-    "": r"((.*_)?(p|pos|position|t|trans|translation|location)(_.*)?_?)?(?P<axis>[xyz])",
-    "q": r"(.*_)?(q|quat|quaternion|orientation|rot|rotation|attitude)(_.*)?_?(?P<axis>[wxyz])",
+    "": r"(((.*_)?(pose|pos|position|t|trans|translation|location)|(.*_)?p(_[a-z]{1,2}){0,2})_?)?"
+    r"(?P<axis>[xyz])(_(p|pos|position))?",
+    "q": r"((.*_)?(quat|quaternion|orientation|rot|rotation|attitude)|(.*_)?q(_[a-z]{1,2}){0,2})_?"
+    r"(?P<axis>[wxyz])",
 }
 """The meanings of columns, by their names in small letters, with _ between words and no unit.
 
-A group "axis" is a part of the meaning.
+A group "axis" is a part of the meaning. Between p or q and the axis, EuRoC has the names of frames.
 """
+_OTHER = re.compile(
+    r"(.*_)?(std|stddev|err|error|cov|covariance|var|variance|sigma|vel|velocity|rate|linear|angular"
+    r"|acc|accel|acceleration|twist|gyro|mag)(_.*)?"
+)
+"""Names of columns that hold no pose, although they may contain the name of an axis."""
+_ORDER = re.compile(
+    r"\b(q_?[0-3wxyz]|r[wxyz]|w[\s,]*x[\s,]*y[\s,]*z|x[\s,]*y[\s,]*z[\s,]*w)\b", re.I
+)
+"""Words in a comment that may tell the order of a quaternion."""
+_BODIES = "child_frame_id", "frame_id", "device_id", "vehiclename", "vehicle", "body", "object"
+"""Names of columns that tell which of several bodies a row belongs to."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_MISSING = {"", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf"}
+_MISSING = {"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"}
+_MISSING |= {"-nan(ind)", "1.#qnan"}
 _LOG = logging.getLogger("rbcourse.files")
 
 
@@ -96,7 +110,8 @@ class Recording(NamedTuple):
 class _Rows(NamedTuple):
     """The lines of a file that hold numbers; `separator` is None for white space.
 
-    There are as many names as columns, or none. No cell is quoted.
+    There are as many names as columns, or none. No cell is quoted. `comment` is a comment that may
+    tell the order of the columns, but is not understood.
     """
 
     file: File
@@ -104,6 +119,7 @@ class _Rows(NamedTuple):
     texts: list[str]
     separator: str | None
     names: list[str]
+    comment: str = ""
 
     def place(self, i: int | np.intp) -> str:
         return f"{self.file}, line {self.lines[i]}"
@@ -123,11 +139,13 @@ def read_recording(
     """Read the rows of a file with poses; the arguments are those of `read_path`."""
     rows = _read_rows(file)
     timed = times is not None or rate is not None
-    columns, stated, length = _named(rows) if rows.names else _unnamed(rows, form, timed)
+    columns, stated, length = _named(rows, form) if rows.names else _unnamed(rows, form, timed)
     _check_times(rows, columns, timed)
-    if form == "euroc" or any(name.lower().startswith("p_rs_r") for name in rows.names):
-        stated = stated or "ns"
-    unit = unit or stated
+    _check_one_body(rows)
+    if rate is not None and unit is not None:
+        raise ValueError("unit: not with rate, which is in Hz")
+    euroc = form == "euroc" or any(name.lower().startswith("p_rs_r") for name in rows.names)
+    known = unit or stated or ("ns" if euroc else None)
     table = _numbers(rows, list(columns.values()))
     found = dict(zip(columns, table.T, strict=True))
     for name in POSITION:
@@ -149,12 +167,12 @@ def read_recording(
     kept: list[int] = np.flatnonzero(complete).tolist()
 
     if timed:
-        given = _given_times(times, rate, len(table), unit or "s")
+        given = _given_times(times, rate, len(table), known or "s")
         stamps = [given[i] for i in kept]
     else:
-        stamps = _stamps(rows, kept, columns, unit or "s")
-    if unit is None:
-        _check_unit(rows.place(kept[0]), stamps)
+        stamps = _stamps(rows, kept, columns, known or "s")
+    if unit != "s" and rate is None:
+        _check_unit(rows.place(kept[0]), stamps, known, sure=bool(unit or stated))
     dropped |= {"repeated": [], "unordered": []}
     ordered, increasing, last = list[int](), list[Decimal](), Decimal("-inf")
     for i, stamp in zip(kept, stamps, strict=True):
@@ -165,9 +183,12 @@ def read_recording(
             continue
         kind, why = ("repeated", "equal to") if stamp == last else ("unordered", "earlier than")
         if kind not in skip:
+            cure = f"skip={kind!r} leaves such rows out"
+            if len(stamps) > 2 and len(set(stamps)) == 1:
+                cure = "all times are equal, so they are not the times of the poses"
             raise ValueError(
-                f"{rows.place(i)}: the time {stamp:f} is {why} the time {last:f} of a row before; "
-                f"skip={kind!r} leaves such rows out"
+                f"{rows.place(i)}: the time {_short(stamp)} is {why} the time {_short(last)} of a "
+                f"row before; {cure}"
             )
         dropped[kind].append(i)
     for kind, which in dropped.items():
@@ -214,41 +235,60 @@ def to_number(place: str, cell: str) -> float:
     """Return a cell as a finite number, or raise a ValueError that names its place."""
     number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
-        raise ValueError(f"{place}: a finite number is wanted, got {cell[:40]!r}")
+        date = "; convert dates to seconds" if re.match(r"\d{4}-\d\d-\d\d", cell) else ""
+        raise ValueError(f"{place}: a finite number is wanted, got {cell[:40]!r}{date}")
     return number
 
 
 def _read_rows(file: File) -> _Rows:
     """Read the lines of a file without comments, and the names of its columns if it has them.
 
-    A comment begins with #, or at the start of a line with %. The names are in the last line before
-    the numbers, or in a comment before them.
+    A comment begins with # or %, or with # after and before white space. The names are in the last
+    line before the numbers, or in a comment before them.
     """
-    lines, texts, heads = list[int](), list[str](), list[tuple[int, str, bool]]()
-    for number, line in enumerate(text_lines(file), start=1):
-        text = line.strip(" ")
-        comment = text.startswith(("#", "%"))
-        if "#" in text and not comment:
-            text = text.partition("#")[0]
-        if not text.strip():
-            continue
-        if not comment and (texts or _has_number(text)):
-            lines.append(number)
-            texts.append(text)
-        elif not texts:
-            heads.append((number, text.lstrip("#% "), comment))
-    if not texts:
+    every, heads = text_lines(file), list[tuple[int, str, bool]]()
+    for number, line in enumerate(every, start=1):
+        text = line.strip()
+        if text and text[0] not in "#%" and _has_number(text):
+            break
+        if text:
+            heads.append((number, text.lstrip("#% \t"), text[0] in "#%"))
+    else:
         raise ValueError(f"{file}: a pose is wanted, but the file has no line with numbers")
+    kept = [
+        (n, line)
+        for n, line in enumerate(every[number - 1 :], start=number)
+        if line and not line.isspace() and line.lstrip()[0] not in "#%"
+    ]
+    lines, texts = [n for n, _ in kept], [line.strip(" ") for _, line in kept]
+    if any("#" in text for text in texts):
+        texts = [re.sub(r"\s#(\s.*)?$", "", text) for text in texts]
+    separator, texts = _separated(file, lines, texts)
+    rows = _Rows(file, lines, texts, separator, [])
+    names = _header(rows, heads)
+    unread = [f"line {n}: {text}" for n, text, _ in heads if not names and _ORDER.search(text)]
+    return rows._replace(names=names, comment="".join(unread[:1]))
+
+
+def _separated(file: File, lines: list[int], texts: list[str]) -> tuple[str | None, list[str]]:
+    """Return the separator of the columns, and lines with decimal points and without quotes."""
     separator, decimal_comma = _separator(texts[0])
-    if decimal_comma:
+    if decimal_comma and any("," in text for text in texts):
+        for n, text in zip(lines, texts, strict=True):
+            if "." in text and re.search(r"(^|[;\s])[+-]?\d*\.\d", text):
+                raise ValueError(
+                    f"{file}, line {n}: numbers have commas and points, got {text[:60]!r}"
+                )
         texts = [text.replace(",", ".") for text in texts]
     if separator and any('"' in text for text in texts):
         cells = [
-            split_line(f"{file}, line {n}", t, separator) for n, t in zip(lines, texts, strict=True)
+            split_line(f"{file}, line {n}", text, separator)
+            for n, text in zip(lines, texts, strict=True)
         ]
         texts = [separator.join(c.replace(separator, " ") for c in row) for row in cells]
-    rows = _Rows(file, lines, texts, separator, [])
-    return rows._replace(names=_header(rows, heads))
+    if separator and texts[0].endswith(separator):
+        texts = [text.removesuffix(separator) for text in texts]
+    return separator, texts
 
 
 def _has_number(text: str) -> bool:
@@ -274,22 +314,31 @@ def _separator(line: str) -> tuple[str | None, bool]:
 
 def _header(rows: _Rows, heads: Sequence[tuple[int, str, bool]]) -> list[str]:
     """Return the names of the columns, or an empty list."""
-    first = rows.cells(0)
+    width, units = len(rows.cells(0)), list[str]()
     for number, text, comment in reversed(heads):
         place = f"{rows.file}, line {number}"
         if separator := next((mark for mark in ";,\t" if mark in text), None):
             names = split_line(place, text, separator)
+            while len(names) > width and not names[-1]:
+                names.pop()
         else:  # a unit in brackets belongs to the name before it
-            names = re.findall(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?", text)
-        if len(names) > len(first) and not names[-1]:
-            names.pop()
-        if len(names) < len(first) and not first[-1]:
-            names.append("")
-        fits = len(names) == len(first)
-        if not comment and not fits:
-            raise ValueError(f"{place}: {len(first)} names of columns are wanted, got {len(names)}")
-        if not comment or (fits and {_meaning(name)[0] for name in names}.issuperset(QUATERNION)):
-            return names
+            names = re.findall(r"[^\s\[(|]+(?:\s*[\[(][^\])]*[\])])?", text)
+        if comment:
+            names = names[-width:]  # after words such as "columns:"
+            found = {_meaning(name)[0] for name in names}
+            if len(names) == width and found.issuperset(QUATERNION):
+                return names
+            continue
+        if len(names) != width:
+            raise ValueError(f"{place}: {width} names of columns are wanted, got {len(names)}")
+        if not units and all(name.strip("[]()").lower() in {"", *_UNITS} for name in names):
+            units = [name.strip("[]()") for name in names]  # below the names
+            continue
+        return (
+            [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
+            if units
+            else names
+        )
     return []
 
 
@@ -300,15 +349,18 @@ def _meaning(name: str) -> tuple[str | None, str | None]:
     bracket = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
     words = re.findall(r"[^\W_]+", (bracket[1] if bracket else name).lower())
     unit = bracket[2].strip().lower() if bracket else ""
-    if not unit and len(words) > 1 and words[-1] in _UNITS and words[-1] != "nsec":
+    if re.fullmatch(_MEANINGS["nanoseconds"], "_".join(words)):
+        return "nanoseconds", None
+    if not unit and len(words) > 1 and words[-1] in _UNITS:
         unit = words.pop()
+    plain = "_".join(words)
     for kind, pattern in _MEANINGS.items():
-        if found := re.fullmatch(pattern, "_".join(words)):
+        if (found := re.fullmatch(pattern, plain)) and not _OTHER.fullmatch(plain):
             return kind + found.groupdict().get("axis", ""), _UNITS.get(unit, unit) or None
     return None, None
 
 
-def _named(rows: _Rows) -> tuple[Columns, str | None, float]:
+def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     """Return the columns that have known names, the unit of time, and the lengths in a metre."""
     found: dict[str, list[int]] = {}
     units: dict[str, str | None] = {}
@@ -317,6 +369,8 @@ def _named(rows: _Rows) -> tuple[Columns, str | None, float]:
         if meaning:
             found.setdefault(meaning, []).append(i)
             units[meaning] = unit
+    if "nanoseconds" in found and "time" not in found:
+        found["time"], units["time"] = found.pop("nanoseconds"), "ns"
     if len(found.get("time", [])) > 1:  # messages of ROS have a stamp besides the time of receipt
         stamps = [i for i in found["time"] if "stamp" in rows.names[i].lower()]
         found["time"] = stamps or found["time"]
@@ -324,15 +378,23 @@ def _named(rows: _Rows) -> tuple[Columns, str | None, float]:
         if len(places) > 1:
             names = " and ".join(repr(rows.names[i]) for i in places[:2])
             raise ValueError(f"{rows.file}: {names} both name a column of {meaning}; rename one")
+    read = {i for places in found.values() for i in places}
+    others = [name for i, name in enumerate(rows.names) if i not in read]
+    axes = [name for name in others if re.search(r"(^|[\W_])[xyz]([\W_]|$)", name, re.I)]
+    axes = [
+        name
+        for name in axes
+        if not _OTHER.fullmatch("_".join(re.findall(r"[^\W_]+", name.lower())))
+    ]
     wanted = list(QUATERNION)
-    wanted += POSITION if found.keys() & set(POSITION) else []
+    wanted += POSITION if axes or found.keys() & set(POSITION) else []
     velocities = list(VELOCITIES.values())[: 6 if "x" in found else 3]
     wanted += velocities if found.keys() & set(velocities) else []
     if missing := [meaning for meaning in wanted if meaning not in found]:
         raise ValueError(
-            f"{rows.file}: no column has the name {' or '.join(missing)}; the names are "
-            f"{', '.join(rows.names)[:300]!r}. Names such as time, x, y, z, qw, qx, qy, qz are "
-            "recognised; for other columns use numpy.loadtxt and pose_from_components"
+            f"{rows.file}: no column has the name {' or '.join(missing)}; rename those of the pose "
+            "to x, y, z, qw, qx, qy, qz, or use numpy.loadtxt and pose_from_components. The names "
+            f"are {', '.join(rows.names)[:300]!r}"
         )
     lengths = {units[name] or "m" for name in POSITION if name in found} or {"m"}
     if len(lengths) > 1 or not lengths <= LENGTHS.keys():
@@ -340,12 +402,22 @@ def _named(rows: _Rows) -> tuple[Columns, str | None, float]:
     time = units.get("time")
     if time not in (None, *DIGITS):
         raise ValueError(f"{rows.file}: times in s, ms, us or ns are wanted, got {time!r}")
-    return {meaning: i for meaning, [i] in found.items()}, time, LENGTHS[lengths.pop()]
+    columns = {meaning: i for meaning, [i] in found.items()}
+    if form is not None:
+        given = {name: i for i, name in enumerate(FORMATS[form])}
+        if any(columns[name] != given.get(name) for name in QUATERNION):
+            raise ValueError(f"format: {rows.file} has names of columns, in another order")
+    return columns, time, LENGTHS[lengths.pop()]
 
 
 def _unnamed(rows: _Rows, form: str | None, timed: bool) -> tuple[Columns, str | None, float]:
     """Return the columns of a format, as `_named` does."""
     width, place = len(rows.cells(0)), rows.place(0)
+    if form is None and rows.comment:
+        raise ValueError(
+            f"{rows.file}: the {width} columns are not recognised in {rows.comment[:99]!r}; "
+            "format='tum' reads quaternions (x, y, z, w), and format='csv' (w, x, y, z)"
+        )
     if form is None and width == 12:
         form = "kitti"
     elif form is None and width in (8, 8 - timed):
@@ -359,12 +431,18 @@ def _unnamed(rows: _Rows, form: str | None, timed: bool) -> tuple[Columns, str |
         hints = {
             7: "If these are TUM poses without times, times= or rate= gives the times",
             13: "If these are KITTI poses after another column, remove it",
+            11: "If these are times in ns, positions and quaternions (w, x, y, z), as of "
+            "VINS-Fusion, format='euroc' reads them",
             16: "numpy.loadtxt(file).reshape(-1, 4, 4) reads 4 × 4 matrices",
         }
         raise ValueError(
             f"{place}: {width} columns without names are wanted to be 8 (TUM: time, position, "
             "quaternion (x, y, z, w)) or 12 (KITTI: three rows of a pose). "
-            + hints.get(width, "Write names such as time,x,y,z,qw,qx,qy,qz in the first line")
+            + hints.get(
+                width,
+                "Remove lines before the names of columns, or write names such as "
+                "time,x,y,z,qw,qx,qy,qz in the first line",
+            )
         )
     meanings = FORMATS[form][1:] if timed and width == 7 else FORMATS[form]
     if width < len(meanings) or (form == "kitti" and width > 12):
@@ -379,27 +457,40 @@ def _check_times(rows: _Rows, columns: Columns, timed: bool) -> None:
     if timed and "time" in columns:
         raise ValueError(f"times, rate: {rows.file} has times, in column {columns['time'] + 1}")
     if not timed and "time" not in columns:
-        kind = "names no column of times" if rows.names else "is a KITTI file, without times"
+        kind = "is a KITTI file, without times"
+        if rows.names:
+            listed = ", ".join(rows.names)[:300]
+            kind = f"has no column with the name time; if one of {listed!r} is the time, rename it"
         raise ValueError(
             f"{rows.file} {kind}: times= takes a file with a time in each line, or the times, and "
             "rate= the number of poses in a second"
         )
 
 
+def _check_one_body(rows: _Rows) -> None:
+    """Refuse rows of several bodies, such as frames of ROS."""
+    for i, name in enumerate(rows.names):
+        if name.lower().rpartition(".")[2] in _BODIES:
+            values = {text.split(rows.separator)[i].strip() for text in rows.texts}
+            if len(values) > 1:
+                some = ", ".join(sorted(values)[:3])
+                raise ValueError(
+                    f"{rows.file}: {name} has several values ({some}); keep the rows of one"
+                )
+
+
 def _numbers(rows: _Rows, chosen: Sequence[int]) -> Array:
     """Return the numbers in the chosen columns, shape (rows, columns); NaN if they are missing."""
     width = len(rows.cells(0))
-    if rows.separator is None:
-        widths = (len(text.split()) for text in rows.texts)
-    else:
-        widths = (text.count(rows.separator) + 1 for text in rows.texts)
-    for i, each in enumerate(widths):
-        if each != width:
-            raise ValueError(f"{rows.place(i)}: {width} columns are wanted, got {each}")
+    options: dict[str, Any] = {"delimiter": rows.separator, "comments": None, "ndmin": 2}
     with suppress(ValueError):  # of missing or wrong numbers; 10 times as fast as below
-        return np.loadtxt(
-            rows.texts, delimiter=rows.separator, usecols=chosen, comments=None, ndmin=2
-        )
+        if sorted(chosen) == [*range(width)]:
+            every: Array = np.loadtxt(rows.texts, **options)
+            return every[:, chosen]
+        if all(text.count(rows.separator or " ") >= width - 1 for text in rows.texts):
+            _check_widths(rows, width)
+            return np.loadtxt(rows.texts, usecols=chosen, **options)
+    _check_widths(rows, width)
     names = rows.names or [f"column {i + 1}" for i in range(width)]
     table = np.full((len(rows.texts), len(chosen)), np.nan)
     for i, row in enumerate(table):
@@ -408,6 +499,12 @@ def _numbers(rows: _Rows, chosen: Sequence[int]) -> Array:
             if cells[column].lower() not in _MISSING:
                 row[k] = to_number(f"{rows.place(i)}, {names[column]}", cells[column])
     return table
+
+
+def _check_widths(rows: _Rows, width: int) -> None:
+    for i, text in enumerate(rows.texts):
+        if (found := len(text.split(rows.separator))) != width:
+            raise ValueError(f"{rows.place(i)}: {width} columns are wanted, got {found}")
 
 
 def _stamps(rows: _Rows, kept: Sequence[int], columns: Columns, unit: str) -> list[Decimal]:
@@ -436,7 +533,7 @@ def _given_times(
         cells = [(n, line.strip()) for n, line in enumerate(text_lines(times), start=1)]
         cells = [(n, cell) for n, cell in cells if cell and cell[0] not in "#%"]
         for n, cell in cells:
-            to_number(f"{times}, line {n}", cell)
+            to_number(f"{times}, line {n}: one time in each line", cell)
         stamps = [Decimal(cell) for _, cell in cells]
     else:
         stamps = list(map(Decimal, as_single("times", np.asarray(times), "N").tolist()))
@@ -445,17 +542,37 @@ def _given_times(
     return [EXACT.scaleb(stamp, -DIGITS[unit]) for stamp in stamps]
 
 
-def _check_unit(place: str, stamps: Sequence[Decimal]) -> None:
-    """Refuse times that cannot be in s: after the year 5000, or a quarter of an hour apart."""
+def _check_unit(place: str, stamps: Sequence[Decimal], known: str | None, sure: bool) -> None:
+    """Refuse times whose unit is not s, or not the unit that is known.
+
+    Times are not in s after the year 5000, with steps of a quarter of an hour, or, in recordings of
+    ten poses or more, with whole steps of 5 or more. Steps below 1 µs belong to another unit.
+    """
     times = np.array(stamps, dtype=float)
-    first, step = abs(times[0]), np.median(np.abs(np.diff(times))) if len(times) > 1 else 0
-    if first >= 1e11:
-        unit = "ms" if first < 1e14 else "us" if first < 1e17 else "ns"
-    elif step >= 1e3:
-        unit = "us" if step < 1e6 else "ns"
-    else:
+    first, step = abs(times[0]), np.median(np.abs(np.diff(times))) if len(times) > 1 else 0.0
+    if known is not None:
+        if 0 < step < 1e-6:
+            raise ValueError(
+                f"{place}: in {known}, the steps of the times have the median {step:.3g} s; unit= "
+                "gives another unit"
+            )
         return
-    raise ValueError(
-        f"{place}: the times begin at {stamps[0]:f}, and their steps have the median {step:.6g}; "
-        f"unit={unit!r} converts them to s, and unit='s' reads them as they are"
+    whole = (
+        len(stamps) > 9 and step >= 5 and all(stamp.as_tuple().exponent == 0 for stamp in stamps)
     )
+    if not (first >= 1e11 or step >= 1e3 or whole):
+        return
+    since_1990 = [unit for unit, digits in DIGITS.items() if 6e8 < first / 10.0**digits < 4e9]
+    likely = [unit for unit, digits in DIGITS.items() if 1e-4 <= step / 10.0**digits <= 3]
+    units = [*since_1990, *(unit for unit in likely if unit not in since_1990)] or list(DIGITS)
+    listed = " or ".join(f"unit={unit!r}" for unit in units[:2] if unit != "s")
+    raise ValueError(
+        f"{place}: the times begin at {_short(stamps[0])}, and their steps have the median "
+        f"{step:.6g}; {listed} converts them to s, and unit='s' reads them as they are"
+    )
+
+
+def _short(stamp: Decimal) -> str:
+    """Return a time for a message."""
+    text = f"{stamp:f}" if abs(stamp.adjusted()) < 30 else f"{stamp:.6e}"
+    return text if len(text) < 40 else f"{text[:40]}…"

@@ -215,6 +215,10 @@ def read_path(
     >>> times, poses.shape, velocities
     (array([0.        , 0.00499994]), (2, 4, 4), None)
     """
+    if not isinstance(file, str | os.PathLike):
+        raise ValueError(f"file: a path is wanted, got {file!r}")
+    if not isinstance(skip, Collection):
+        raise ValueError(f"skip: a word or a collection of words is wanted, got {skip!r}")
     skip = [skip] if isinstance(skip, str) else list(skip)
     for name, values, known in (
         ("skip", skip, ["repeated", "nan", "unordered"]),
@@ -323,6 +327,8 @@ def replace_file(file: File, content: bytes) -> None:
 
 
 def _is_tum(file: File) -> bool:
+    if not isinstance(file, str | os.PathLike):
+        raise ValueError(f"file: a path is wanted, got {file!r}")
     suffix = os.path.splitext(file)[1].lower()
     if suffix not in (".csv", ".tum", ".txt"):
         raise ValueError(f"file: a name that ends in .csv, .tum or .txt is wanted, got {file}")
@@ -355,16 +361,18 @@ def _rotations(recording: Recording) -> Array:
 def _relative(recording: Recording, start: Any) -> Array:
     """Return the times of a recording after `start`, rounded once."""
     first = Decimal(0)
-    if start == "first":
+    if isinstance(start, str) and start == "first":
         first = recording.stamps[0]
     elif start is not None:
         try:
-            first = Decimal(start)
+            first = Decimal(start if isinstance(start, int | str | Decimal) else float(start))
         except (ArithmeticError, TypeError, ValueError):
             first = Decimal("nan")
-        if not first.is_finite():
-            raise ValueError(f"start: None, 'first' or a time in s is wanted, got {start!r}")
+        if not (first.is_finite() and first.adjusted() < 300):
+            raise ValueError(f"start: None, 'first' or a time in s is wanted, got {start!r:.60}")
     times = np.array([float(EXACT.subtract(stamp, first)) for stamp in recording.stamps])
+    if not np.isfinite(times).all():
+        raise ValueError(f"{recording.place(np.argmin(np.isfinite(times)))}: the time is too large")
     if (equal := np.flatnonzero(times[1:] <= times[:-1])).size:
         i = equal[0] + 1
         raise ValueError(

@@ -134,6 +134,39 @@ GOOD = {
     ),
     "tartanair.txt": (f"{ROW}\n{ROW}\n", {"rate": 10}, [0, 0.1]),
     "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", {"times": [3]}, [3]),
+    "vins_fusion.csv": (
+        f"1403636580838555648,{ROWS},0.1,0,0,\n",
+        {"format": "euroc", "start": "first"},
+        [0],
+    ),
+    "header_in_words.txt": (
+        f"# columns: t x y z qw qx qy qz\n0.5 {ROWS}\n".replace(",", " "),
+        {},
+        [0.5],
+    ),
+    "header_tabs.txt": (
+        f"#\ttime\tx\ty\tz\tqw\tqx\tqy\tqz\n0.5\t{ROWS}\n".replace(",", "\t"),
+        {},
+        [0.5],
+    ),
+    "time_nsec.csv": (f"time_nsec,x,y,z,qw,qx,qy,qz\n500000000,{ROWS}\n", {}, [0.5]),
+    "axis_first.csv": (f"t,x_position,y_position,z_position,qw,qx,qy,qz\n1,{ROWS}\n", {}, [1]),
+    "std.csv": (
+        f"t,x,y,z,qw,qx,qy,qz,pos_std_x,pos_std_y,pos_std_z,q_err_w\n1,{ROWS},9,9,9,9\n",
+        {},
+        [1],
+    ),
+    "units_below.csv": (
+        f"t,x,y,z,qw,qx,qy,qz\nms,mm,mm,mm,,,,\n500,1500,-250,750,{WXYZ}\n",
+        {},
+        [0.5],
+    ),
+    "excel_lost.csv": (
+        f"{OWN}\n0.5,{ROWS}\n1,#N/A,#N/A,#N/A,#N/A,#N/A,#N/A,#N/A\n",
+        {"skip": "nan"},
+        [0.5],
+    ),
+    "one_body.csv": (f"t,child_frame_id,{OWN[9:]}\n0.5,base,{ROWS}\n1,base,{ROWS}\n", {}, [0.5, 1]),
     "own.csv": (f"{OWN}\n0.5,{ROWS}\n\n# here\n1,{ROWS}\n", {}, [0.5, 1]),
     "quoted.csv": (
         f'"time","x","y","z","qw","qx","qy","qz","a, b"\n"0.5",{ROWS},"1, 2"\n',
@@ -159,7 +192,7 @@ REFUSED = {
         f"time,a_pos_x,b_pos_x,y,z,qw,qx,qy,qz\n0,1,{ROWS}\n",
         "'a_pos_x' and 'b_pos_x' both name a column of x; rename one",
     ),
-    "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", "names no column of times: times= takes"),
+    "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", "the name time; .*: times= takes"),
     "inches.csv": (f"time,x [in],y [in],z [in],qw,qx,qy,qz\n0,{ROWS}\n", "positions in m, cm or"),
     "minutes.csv": (f"time [min],x,y,z,qw,qx,qy,qz\n0,{ROWS}\n", "times in s, ms, us or ns"),
     "half_of_the_rates.csv": (f"{OWN},wx body [rad/s]\n0,{ROWS},1\n", "the name wy or wz or vx"),
@@ -170,6 +203,31 @@ REFUSED = {
     "relative_ns.txt": ("".join(f"{5000000 * i} {ROW}\n" for i in range(9)), "unit='ns' converts"),
     "relative_us.txt": ("".join(f"{5000 * i} {ROW}\n" for i in range(9)), "unit='us' converts"),
     "near.txt": (f"1403636580.12345678 {ROW}\n1403636580.12345679 {ROW}\n", "start='first'"),
+    "boot_clock.txt": (
+        "".join(f"{81234567000000 + 50000000 * i} {ROW}\n" for i in range(3)),
+        "unit='ns' converts",
+    ),
+    "whole_ms.txt": ("".join(f"{33 * i} {ROW}\n" for i in range(12)), "unit='ms' converts"),
+    "euroc_in_s.csv": (
+        f"{EUROC.format('')}\n1403636580.838,{ROWS}\n1403636580.843,{ROWS}\n",
+        "in ns, the steps of the times have the median 5e-12 s; unit= gives another unit",
+    ),
+    "order_in_words.txt": (
+        f"# t p(x,y,z) q(w,x,y,z)\n0 {ROWS.replace(',', ' ')}\n",
+        "8 columns are not recognised in 'line 1: t p.*format='tum' reads",
+    ),
+    "nine_columns.txt": (f"# id t x y z qw qx qy\n1 0 {ROW}\n", "9 columns are not recognised in"),
+    "only_std.csv": (
+        f"t,odom_a,odom_b,odom_c,qw,qx,qy,qz,my_x,my_y\n0,{ROWS},1,2\n",
+        "no column has the name x or y or z",
+    ),
+    "thousands.csv": ("t;x;y;z;qw;qx;qy;qz\n0;1.500;-250,0;750;1;0;0;0\n", "commas and points"),
+    "tf.csv": (
+        f"t,child_frame_id,{OWN[9:]}\n0,odom,{ROWS}\n1,base,{ROWS}\n",
+        r"child_frame_id has several values \(base, odom\)",
+    ),
+    "dates.csv": (f"time,x,y,z,qw,qx,qy,qz\n2011-09-26 13:02:25,{ROWS}\n", "convert dates to"),
+    "stamps.txt": (f"0 {ROW}\n" * 3, "all times are equal"),
     "lost.txt": (f"0 {ROW}\n1 NaN NaN NaN NaN NaN NaN NaN\n", "line 2: .*skip='nan'"),
     "vicon.csv": (f"{OWN}\n0,{ROWS}\n1,0,0,0,0,0,0,0\n", "line 3: .*skip='nan'"),
     "empty_cells.csv": (f"{OWN}\n0,{ROWS}\n1,,,,,,,\n", "line 3: .*skip='nan'"),
@@ -226,7 +284,7 @@ def test_times_in_a_second_file_are_exact(tmp_path):
     assert times.tolist() == [0, 0.1, 0.2]
     with pytest.raises(ValueError, match="times: 3 are wanted, one for each pose, got 2"):
         rb.read_path(file, times=[0, 1])
-    with pytest.raises(ValueError, match=r"times.txt, line 2: a finite number is wanted, got 'x'"):
+    with pytest.raises(ValueError, match=r"times.txt, line 2: one time in each line: a finite"):
         rb.read_path(file, times=written(tmp_path, "times.txt", "0\nx\n2\n"))
     with pytest.raises(ValueError, match="times, rate: one of them is wanted, got both"):
         rb.read_path(file, times=clock, rate=3)
@@ -278,6 +336,29 @@ def test_skipped_rows_are_left_out_and_told(tmp_path, caplog):
             rb.read_path(file, skip=skip)
     with pytest.raises(ValueError, match="no row has all its numbers"):
         rb.read_path(written(tmp_path, "b.txt", f"0 {lost}\n"), skip="nan")
+    c = written(tmp_path, "c.txt", f"0 {ROW}\n")
+    for start in ("1e999999999", 10**400, np.array([1, 2]), [], "nan"):
+        with pytest.raises(ValueError, match=r"^start: None, 'first' or a time in s is wanted"):
+            rb.read_path(c, start=start)
+    for start in (np.int64(2), np.float32(2), np.array(2), 2, "2.0", Decimal(2)):
+        assert rb.read_path(c, start=start)[0] == -2
+    for file in (3, None, True, 1.5):
+        with pytest.raises(ValueError, match=r"^file: a path is wanted, got"):
+            rb.read_path(file)
+        with pytest.raises(ValueError, match=r"^file: a path is wanted, got"):
+            rb.write_path(file, [0], P[None])
+    for skip in (None, 1, True):
+        with pytest.raises(ValueError, match=r"^skip: a word or a collection of words is wanted"):
+            rb.read_path(c, skip=skip)
+    with pytest.raises(ValueError, match=r"^unit: not with rate"):
+        rb.read_path(written(tmp_path, "d.txt", KITTI), rate=3, unit="ms")
+    far = written(tmp_path, "far.txt", f"-1.7e308 {ROW}\n1.7e308 {ROW}\n")
+    with pytest.raises(ValueError, match=r"far.txt, line 2: the time is too large"):
+        rb.read_path(far, start="first", unit="s")
+    named = written(tmp_path, "named.txt", f"# t x y z qx qy qz qw\n0 {ROW}\n")
+    assert rb.read_path(named, format="tum")[0] == 0
+    with pytest.raises(ValueError, match=r"^format: .*has names of columns, in another order"):
+        rb.read_path(named, format="csv")
     for name, value in {"skip": "late", "format": "bag", "unit": "min", "start": "last"}.items():
         with pytest.raises(ValueError, match=f"^{name}: .* wanted, got '{value}'"):
             rb.read_path(written(tmp_path, "c.txt", f"0 {ROW}\n"), **{name: value})
