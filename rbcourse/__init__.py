@@ -17,6 +17,7 @@ state which body moves                       Body(inertia, mass, centre), Body.b
 pass through many poses with continuous      projected_spline (for any body), quaternion_spline;
 acceleration                                 joined, for a rotation and a position
 join them with given velocities              chain
+pass near noisy poses                        smoothing_spline
 pass through them with the least cost        minimum_acceleration_spline (for any body); for
                                              rotations, minimum_torque_spline, minimum_jerk_spline
 evaluate a curve c                           c(t), c(t, 1), c(t, 2); c.state(t) for all three
@@ -66,6 +67,7 @@ from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts, jer
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.geodesics import geodesic, projected_line, screw, screw_from_pose
 from rbcourse.curves.projected import projected_cubic, projected_quintic
+from rbcourse.curves.smoothing import smoothing_spline
 from rbcourse.curves.timing import Limits, Timed, fastest, limits_used
 from rbcourse.curves.velocities import bessel_velocities, spline_velocities
 from rbcourse.files import read_path, write_path
@@ -175,6 +177,7 @@ __all__ = [  # noqa: RUF022 - sorted by subject
     "minimum_jerk_spline",
     "spline_velocities",
     "bessel_velocities",
+    "smoothing_spline",
     "joined",
     "fastest",
     "limits_used",

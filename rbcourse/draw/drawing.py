@@ -35,7 +35,7 @@ OPTIONS: Mapping[str, tuple[tuple[int, ...], str]] = {
 """The shape and the meaning of each option of the command."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Drawing:
     """A figure of a text, with the numbers that it shows.
 
@@ -59,6 +59,9 @@ class Drawing:
     data: Table
     alt: str
     moving: tuple[Update, int, float] | None = None
+
+    def __repr__(self) -> str:
+        return f"{self.name}: {self.alt}"
 
     def write(self, folder: str | Path = ".") -> None:
         """Write the figure as PNG and PDF, and its numbers as CSV; the figure is closed.

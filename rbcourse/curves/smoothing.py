@@ -1,0 +1,346 @@
+"""A smooth curve near noisy rotations or poses: smoothing splines in the ambient space, projected.
+
+Vectors Mᵢ are measured at the times tᵢ with weights wᵢ. Among all curves, a C² cubic spline has the
+least Σ wᵢ ‖M(tᵢ) − Mᵢ‖² + λ ∫ ‖M'' − F‖² dt, where F is a given function that is linear between the
+times. Let h be the steps, Q ᵀM the differences of the slopes ΔM/h, and B the matrix with the rows
+(hᵢ, 2 (hᵢ + hᵢ₊₁), hᵢ₊₁)/6. For every C² cubic spline, QᵀM = B M''. With γ = M'' − F, which is 0 at
+natural ends, the cost is Σ wᵢ ‖M(tᵢ) − Mᵢ‖² + λ γᵀ B γ, and it is least if
+
+    (B + λ Qᵀ W⁻¹ Q) γ = Qᵀ Mᵢ − B F,    M(tᵢ) = Mᵢ − λ W⁻¹ Q γ.
+
+This matrix has five bands, and is the same for all components. M(tᵢ) is linear in the data: A Mᵢ
+plus a constant. The residuals have n − tr A = d log det(B + λ Qᵀ W⁻¹ Q) / d log λ degrees of
+freedom for each component. An oscillation with the period P keeps 1/(1 + (P₀/P)⁴) of its amplitude,
+where P₀/2π is the fourth root of λ times the mean step, over the mean weight.
+
+For rotations, M'' = R (ŵ' + ŵ²), and for unit quaternions q'' = q (½ w' − ¼ ‖w‖²). Only the terms
+with w' should cost something. So F is the other term, with w from a first spline, which is that of
+the matrices: projected, it also gives the quaternions their signs.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rbcourse._checks import as_single, check_all
+from rbcourse._numerics import Array, matvec
+from rbcourse._quaternions import quaternion_of
+from rbcourse._valid import as_rotations_or_poses
+from rbcourse.curves.chain import Chain
+from rbcourse.curves.closed import QuaternionCubic
+from rbcourse.curves.rigid import RigidMotion
+from rbcourse.projection import nearest
+from rbcourse.quaternion import continuous_quaternions, quaternion_conjugate, quaternion_multiply
+from rbcourse.so3 import vee
+
+_LEAST, _STEP, _MOST = -12.0, 1.5, 28.0  # of log λ, if the mean step and the mean weight are 1
+_DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SmoothedChain(Chain):
+    """A twice differentiable `Chain` near noisy rotations or poses; it has a leg for each step.
+
+    Attributes
+    ----------
+    period : float or ndarray, shape (2,)
+        The period of the smoothing; for poses, the periods for the rotation and for the origin.
+    noise : float or ndarray, shape (2,)
+        The estimated standard deviation of the noise of a pose of weight 1: about each axis in rad;
+        for poses also along each axis in m.
+    """
+
+    velocities: Array
+    period: float | Array
+    noise: float | Array
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the chain with another duration; the first time is kept."""
+        share = float(duration / self.duration)
+        return replace(super().lasting(duration), period=self.period * share)
+
+
+def smoothing_spline(
+    times: ArrayLike,
+    poses: ArrayLike,
+    ends: Literal["natural", "rest"] = "natural",
+    *,
+    noise: ArrayLike | None = None,
+    period: ArrayLike | None = None,
+    weights: ArrayLike | None = None,
+) -> SmoothedChain:
+    """Return a smooth curve near noisy rotations or poses: a smoothing spline, projected.
+
+    Source: BK 4, BK 6.
+
+    Parameters
+    ----------
+    times : array_like, shape (N,)
+        Times that do not decrease, with three or more different values. The poses of equal times
+        are averaged.
+    poses : array_like, shape (N, 3, 3) or (N, 4, 4)
+        A rotation matrix or a pose for each of the times.
+    ends : {"natural", "rest"}, optional
+        Whether the acceleration or the velocity is 0 at both ends.
+    noise : float, or array_like, shape (2,), optional
+        The standard deviation of the noise: in rad about each axis, and for poses a pair, also in m
+        along each axis. The smoothing has the least expected error at the times of the poses.
+    period : float, or array_like, shape (2,), optional
+        Oscillations with this period keep half of their amplitude, and faster ones less; for poses
+        a pair may be given, for the rotation and the origin. Without `noise` and `period`,
+        generalised cross validation chooses the period.
+    weights : array_like, shape (N,), optional
+        Positive weights; the variance of the noise of a pose is noise² divided by its weight.
+
+    Returns
+    -------
+    SmoothedChain
+        A chain of quaternion cubics, with continuous acceleration. It has the attributes ``period``
+        and ``noise``, the estimate of the noise. For poses, the origin moves on a smoothing spline.
+
+    Warns
+    -----
+    RuntimeWarning
+        If the body turns by more than 1 rad in the time period/2π, or if nothing is smoothed.
+
+    Notes
+    -----
+    Moved rotations give the moved curve; reversed times reverse it. A pose of another point of the
+    body is smoothed differently, since the origin is. If the body turns by θ in the time period/2π,
+    the cost Σ wᵢ ‖R(tᵢ) − Rᵢ‖² + λ ∫ 2 ‖w'‖² dt is larger than the least by about 0.05 θ⁴ of it.
+    Singular set: that of `quaternion_spline`. Wrong poses need small weights; this loop finds them,
+    and then ``times[good]`` and ``poses[good]`` are smoothed::
+
+        w = np.ones(len(times))
+        for _ in range(5):
+            off = angle_between(smoothing_spline(times, R, weights=w)(times), R)
+            w = np.minimum(1, 1.5 * np.median(off) / off)
+        good = off < 3 * np.median(off)
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3
+    >>> t, rng = np.linspace(0, 1, 50), np.random.default_rng(1)
+    >>> measured = exp_so3(t[:, None] ** 2 * [0, 0, 2] + rng.normal(scale=0.02, size=(50, 3)))
+    >>> c = smoothing_spline(t, measured)
+    >>> c(0.5, 1).round(1) + 0.0, round(c.noise, 2)
+    (array([0., 0., 2.]), 0.02)
+    """
+    A, size = as_rotations_or_poses("poses", poses)
+    times, w = _checked_data(times, A, weights)
+    if noise is not None and period is not None:
+        raise ValueError("noise, period: one of them is wanted, got both")
+    parts = size // 3
+    of = [_as_pair("noise", noise, parts, alike=False), _as_pair("period", period, parts)]
+    smoother = Smoother(times, w, ends)
+    turning = _smoothed_rotations(smoother, A[:, :3, :3], of[0][0], of[1][0])
+    if parts == 1:
+        return turning
+    d = A[:, :3, 3]
+
+    def misfit(smoothing: float) -> float:
+        return smoother.sum_of(d - smoother.fit(d, smoothing)[0][smoother.which])
+
+    found = smoother.best(misfit, of[0][1], of[1][1])
+    x, v = smoother.fit(d, found.smoothing)
+    h = turning.legs.duration[:, None]
+    path = np.stack([x[:-1], x[1:], h * v[:-1], h * v[1:]], axis=-2)
+    legs = RigidMotion(duration=turning.legs.duration, rotation=turning.legs, path=path)
+    R = turning(turning.times)
+    return replace(
+        turning,
+        legs=legs,
+        velocities=np.append(turning.velocities, matvec(R.mT, v), axis=1),
+        period=np.array([turning.period, found.period]),
+        noise=np.array([turning.noise, found.noise]),
+    )
+
+
+def _smoothed_rotations(
+    smoother: Smoother, R: Array, noise: float | None, period: float | None
+) -> SmoothedChain:
+    found = smoother.best(lambda x: _quaternions(smoother, R, x)[2], noise, period)
+    q, rates, _ = _quaternions(smoother, R, found.smoothing)
+    inverse = quaternion_conjugate(q) / np.sum(q * q, axis=1, keepdims=True)
+    w = 2 * quaternion_multiply(inverse, rates)[:, 1:]
+    turn = found.period / (2 * np.pi) * np.sqrt(np.mean(np.sum(w * w, axis=1)))
+    if turn > _DOMAIN:
+        warnings.warn(
+            f"the body turns by {turn:.2g} rad in the time period/2π, and the closed form is near "
+            f"the optimum up to {_DOMAIN:g} rad; choose a shorter period",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    h = np.diff(smoother.knots)[:, None]
+    controls = np.stack([q[:-1], q[1:], h * rates[:-1], h * rates[1:]], axis=-2)
+    one = np.broadcast_to(np.eye(4)[0], (len(h), 4))
+    return SmoothedChain(
+        duration=np.array(smoother.knots[-1] - smoother.knots[0]),
+        times=smoother.knots,
+        legs=QuaternionCubic(duration=h[:, 0], start=one, controls=controls),
+        velocities=w,
+        period=found.period,
+        noise=found.noise,
+    )
+
+
+def _quaternions(smoother: Smoother, R: Array, smoothing: float) -> tuple[Array, Array, float]:
+    """Return quaternions of any norm and their rates at the knots, and Σ w (3 − tr RᵢᵀR)."""
+    M, M_rates = (x.reshape(-1, 3, 3) for x in smoother.fit(R.reshape(-1, 9), smoothing))
+    first = nearest(M)[0]
+    S, K = first.mT @ M, first.mT @ M_rates
+    spin = np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3) - S
+    w = np.linalg.solve(spin, vee(K - K.mT)[..., None])[..., 0]
+    q, data = continuous_quaternions(quaternion_of(first)), quaternion_of(R)
+    data = np.where(np.sum(data * q[smoother.which], axis=1, keepdims=True) < 0, -data, data)
+    centripetal = -np.sum(w * w, axis=1, keepdims=True) / 4 * q
+    q, rates = smoother.fit(data, smoothing, centripetal)
+    unit = q / np.linalg.norm(q, axis=1, keepdims=True)
+    off = quaternion_multiply(quaternion_conjugate(unit)[smoother.which], data)
+    return q, rates, 4 * smoother.sum_of(off[:, 1:])
+
+
+def _checked_data(times: ArrayLike, poses: Array, weights: ArrayLike | None) -> tuple[Array, Array]:
+    times = as_single("times", times, "N")
+    w = np.ones(len(times)) if weights is None else as_single("weights", weights, "N")
+    if poses.ndim != 3 or not len(times) == len(poses) == len(w):
+        raise ValueError(
+            f"times, poses, weights: equal numbers are wanted, got {len(times)}, {poses.shape} "
+            f"and {len(w)}"
+        )
+    late = np.flatnonzero(np.diff(times) < 0)
+    if len(late):
+        i = late[0]
+        raise ValueError(f"times[{i + 1}] is {times[i + 1]}, a time from {times[i]} on is wanted")
+    check_all(w > 0, "weights", w, "a number above 0")
+    if len(np.unique(times)) < 3:
+        raise ValueError("times: three or more different ones are wanted")
+    return times, w
+
+
+def _as_pair(
+    name: str, value: ArrayLike | None, parts: int, alike: bool = True
+) -> Sequence[float | None]:
+    """Return a value for the rotation and, of poses, one for the origin."""
+    if value is None:
+        return [None] * parts
+    values = as_single(name, np.atleast_1d(np.asarray(value)), "k")
+    if len(values) != parts and not (alike and len(values) == 1):
+        raise ValueError(
+            f"{name}: "
+            + ("a pair, for the rotation and the origin, is" if parts > 1 else "one is")
+            + f" wanted, got {value!r}"
+        )
+    check_all(values > 0, name, values, "a number above 0")
+    return [float(x) for x in np.broadcast_to(values, parts)]
+
+
+class Smoothing(NamedTuple):
+    """The smoothing λ in the units of a `Smoother`, its period, and the noise that is left."""
+
+    smoothing: float
+    period: float
+    noise: float
+
+
+class Smoother:
+    """Smoothing splines of vectors that are measured at given times with given weights.
+
+    Vectors at equal times are replaced by their weighted mean. For ends at rest, a leg of duration
+    0 and slope 0 is put before the first knot and after the last one. The unit of time is the mean
+    step, and the unit of the weights is the mean of their sums at the knots.
+    """
+
+    def __init__(self, times: Array, weights: Array, ends: str) -> None:
+        if ends not in ("natural", "rest"):
+            raise ValueError(f"ends: 'natural' or 'rest' is wanted, got {ends!r}")
+        self.knots, self.first, self.which = np.unique(times, True, True)
+        self.weights, self.pad = weights, int(ends == "rest")
+        self.total = np.add.reduceat(weights, self.first)
+        self.unit = float(np.diff(self.knots).mean())
+        self.u = u = self._padded(self.total.mean() / self.total)
+        self.h = h = np.diff(self._padded(self.knots)) / self.unit
+        k = np.divide(1, h, out=np.zeros_like(h), where=h > 0)
+        self.Q = a, b, c = k[:-1], -k[:-1] - k[1:], k[1:]
+        self.B, self.K = np.zeros((2, 3, len(a)))  # lower bands
+        self.B[0], self.B[1, :-1] = (h[:-1] + h[1:]) / 3, h[1:-1] / 6
+        self.K[0] = a**2 * u[:-2] + b**2 * u[1:-1] + c**2 * u[2:]
+        self.K[1, :-1] = b[:-1] * a[1:] * u[1:-2] + c[:-1] * b[1:] * u[2:-1]
+        self.K[2, :-2] = c[:-2] * a[2:] * u[2:-2]
+
+    def _padded(self, values: Array) -> Array:
+        return np.pad(values, [(self.pad, self.pad), *[(0, 0)] * (values.ndim - 1)], mode="edge")
+
+    def sum_of(self, residuals: Array) -> float:
+        """Return Σ wᵢ ‖rᵢ‖²."""
+        return float(self.weights @ np.sum(residuals**2, axis=1))
+
+    def fit(self, data: Array, smoothing: float, F: Array | None = None) -> tuple[Array, Array]:
+        """Return the values and the rates at the knots, shape (knots, components)."""
+        from scipy.linalg import solveh_banded
+
+        mean = np.add.reduceat(self.weights[:, None] * data, self.first) / self.total[:, None]
+        y, h, (a, b, c) = self._padded(mean), self.h[:, None], (x[:, None] for x in self.Q)
+        second = self._padded(np.zeros_like(mean) if F is None else self.unit**2 * F)
+        load = a * y[:-2] + b * y[1:-1] + c * y[2:]
+        load -= (h[:-1] * (second[:-2] + 2 * second[1:-1])) / 6
+        load -= (h[1:] * (2 * second[1:-1] + second[2:])) / 6
+        gamma = solveh_banded(self.B + smoothing * self.K, load, lower=True)
+        second[1:-1] += gamma
+        for part, share in ((slice(-2), a), (slice(1, -1), b), (slice(2, None), c)):
+            y[part] -= smoothing * self.u[part, None] * share * gamma
+        kept = slice(self.pad, len(y) - self.pad)
+        y, second, h = y[kept], second[kept], np.diff(self.knots)[:, None] / self.unit
+        slopes = np.diff(y, axis=0) / h
+        rates = np.append(slopes - h * (2 * second[:-1] + second[1:]) / 6, slopes[-1:], axis=0)
+        rates[-1] += h[-1] * (second[-2] + 2 * second[-1]) / 6
+        return y, rates / self.unit
+
+    def freedom(self, smoothing: float) -> float:
+        """Return n − tr A, by a difference of fourth order of log det."""
+        from scipy.linalg import cholesky_banded
+
+        scales = smoothing * np.exp([-0.02, -0.01, 0.01, 0.02])
+        logs = [np.log(cholesky_banded(self.B + x * self.K, lower=True)[0]).sum() for x in scales]
+        # half of log det is the sum of the logarithms of the diagonal
+        slope = np.dot([1, -8, 8, -1], logs) / (12 * 0.01)
+        return len(self.weights) - len(self.knots) + 2 * float(slope)
+
+    def best(
+        self, misfit: Callable[[float], float], noise: float | None, period: float | None
+    ) -> Smoothing:
+        """Return the smoothing of a noise or a period, or by cross validation.
+
+        ``misfit(smoothing)`` is Σ wᵢ ‖rᵢ‖², where rᵢ has three components.
+        """
+        from scipy.optimize import minimize_scalar
+
+        def score(log: float) -> float:
+            free, left = self.freedom(np.exp(log)), misfit(float(np.exp(log)))
+            if noise is not None:  # the expected error, up to a constant
+                return left - 6 * noise**2 * free
+            return float(np.log(max(left, 1e-300)) - 2 * np.log(free))
+
+        if period is not None:
+            smoothing = (period / (2 * np.pi * self.unit)) ** 4
+        else:
+            logs = np.arange(_LEAST, min(4 * np.log(len(self.knots)), _MOST), _STEP)
+            best = logs[np.argmin([score(x) for x in logs])]
+            bounds, options = (best - _STEP, best + _STEP), {"xatol": 0.05}
+            found = minimize_scalar(score, bounds=bounds, method="bounded", options=options)
+            smoothing = float(np.exp(found.x))
+            if best == logs[0]:
+                warnings.warn(
+                    "cross validation finds nothing to smooth, so the noise is not known; give "
+                    "noise or period",
+                    RuntimeWarning,
+                    stacklevel=4,
+                )
+        noise = np.sqrt(misfit(smoothing) / (3 * self.freedom(smoothing)))
+        return Smoothing(smoothing, 2 * np.pi * self.unit * smoothing**0.25, float(noise))
