@@ -23,7 +23,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,8 +57,8 @@ class SmoothedChain(Chain):
     """
 
     velocities: Array
-    period: float | Array
-    noise: float | Array
+    period: Any
+    noise: Any
 
     def lasting(self, duration: Array) -> Self:
         """Return the chain with another duration; the first time is kept."""
