@@ -286,8 +286,6 @@ def _separated(file: File, lines: list[int], texts: list[str]) -> tuple[str | No
             for n, text in zip(lines, texts, strict=True)
         ]
         texts = [separator.join(c.replace(separator, " ") for c in row) for row in cells]
-    if separator and texts[0].endswith(separator):
-        texts = [text.removesuffix(separator) for text in texts]
     return separator, texts
 
 
@@ -314,7 +312,8 @@ def _separator(line: str) -> tuple[str | None, bool]:
 
 def _header(rows: _Rows, heads: Sequence[tuple[int, str, bool]]) -> list[str]:
     """Return the names of the columns, or an empty list."""
-    width, units = len(rows.cells(0)), list[str]()
+    first, units = rows.cells(0), list[str]()
+    width = len(first)
     for number, text, comment in reversed(heads):
         place = f"{rows.file}, line {number}"
         if separator := next((mark for mark in ";,\t" if mark in text), None):
@@ -323,6 +322,8 @@ def _header(rows: _Rows, heads: Sequence[tuple[int, str, bool]]) -> list[str]:
                 names.pop()
         else:  # a unit in brackets belongs to the name before it
             names = re.findall(r"[^\s\[(|]+(?:\s*[\[(][^\])]*[\])])?", text)
+        if not first[-1] and len(names) == width - 1:
+            names.append("")
         if comment:
             names = names[-width:]  # after words such as "columns:"
             found = {_meaning(name)[0] for name in names}
@@ -412,7 +413,8 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
 
 def _unnamed(rows: _Rows, form: str | None, timed: bool) -> tuple[Columns, str | None, float]:
     """Return the columns of a format, as `_named` does."""
-    width, place = len(rows.cells(0)), rows.place(0)
+    cells, place = rows.cells(0), rows.place(0)
+    width = len(cells) - (not cells[-1])  # a separator may be at the end of each line
     if form is None and rows.comment:
         raise ValueError(
             f"{rows.file}: the {width} columns are not recognised in {rows.comment[:99]!r}; "

@@ -116,6 +116,9 @@ GOOD = {
         [1000.25],
     ),
     "pandas.csv": (f",time,x,y,z,qw,qx,qy,qz,label\n0,0.5,{ROWS},a\n1,1.0,{ROWS},\n", {}, [0.5, 1]),
+    "pandas_empty.csv": (f",time,x,y,z,qw,qx,qy,qz,label\n0,0.5,{ROWS},\n1,1,{ROWS},a\n", {}, None),
+    "pandas_never.csv": (f",time,x,y,z,qw,qx,qy,qz,label\n0,0.5,{ROWS},\n", {}, [0.5]),
+    "separator_at_end.csv": (f"time,x,y,z,qw,qx,qy,qz\n0.5,{ROWS},\n", {}, [0.5]),
     "excel_german.csv": (
         f"\ufeff{OWN}".replace(",", ";") + "\r\n0,5;1,5;-0,25;0,75;0,8;0;0;0,6\r\n",
         {},
