@@ -1,4 +1,4 @@
-"""Metrics on matrices and on the groups: trace metrics, invariance, inertia and weight.
+"""Metrics on matrices and on the groups: trace metrics, means, invariance, inertia and weight.
 
 Tangent vectors at A are matrices X = A hat(x), where x are the components of X in the
 left-invariant frame: an angular velocity on SO(3), or a twist (ω, v) on SE(3).
@@ -9,12 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_finite, as_positive, as_symmetric, check_broadcast
+from rbcourse._checks import as_finite, as_positive, as_symmetric, check_all, check_broadcast
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import weight_of
-from rbcourse.se3 import hat_se3
+from rbcourse.projection import nearest
+from rbcourse.se3 import hat_se3, join
 from rbcourse.so3 import hat_so3, vee
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "inner_left_invariant",
     "inner_se3",
     "inner_so3",
+    "mean_rotation",
     "semi_riemannian_metric_se3",
     "tangent_from_components",
     "weight_from_inertia",
@@ -288,3 +290,52 @@ def _trace(X: ArrayLike, Y: ArrayLike, size: int | str) -> Array:
         )
     product: Array = (X * Y).sum(axis=(-2, -1))
     return product
+
+
+def mean_rotation(rotations: ArrayLike, weights: ArrayLike | None = None) -> Array:
+    """Return the rotation R with the least Σ wᵢ ‖R − Rᵢ‖², or the pose: the mean, projected.
+
+    Source: BK 4, BK Prop. 2, BK 5.
+
+    Parameters
+    ----------
+    rotations : array_like, shape (..., N, 3, 3) or (..., N, 4, 4)
+        N rotation matrices or poses.
+    weights : array_like, shape (..., N), optional
+        Positive weights, such as 1/σᵢ² for a noise of σᵢ rad.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3) or (..., 4, 4)
+
+    Raises
+    ------
+    ValueError
+        Also if the mean is not unique, as of two rotations a half-turn apart.
+
+    Notes
+    -----
+    ‖R − Rᵢ‖² = 6 − 2 tr RᵀRᵢ, so R has the largest tr RᵀM, where M = Σ wᵢ Rᵢ: the nearest rotation
+    of M (Kabsch; Wahba). If the rotations are moved, R moves with them. It is unique if all
+    rotations are less than 90° from one rotation. For normal noise of σ rad about each axis, the
+    variance of R about each axis is (1 + σ²/3) σ²/N, up to terms in σ⁴.
+
+    Examples
+    --------
+    >>> from rbcourse import exp_so3, log_so3
+    >>> log_so3(mean_rotation(exp_so3([[0, 0, 0.1], [0, 0, 0.4]]), [2, 1])).round(3)
+    array([0. , 0. , 0.2])
+    """
+    A, _ = as_rotations_or_poses("rotations", rotations)
+    if A.ndim < 3:
+        raise ValueError(f"rotations: shape (..., N, 3, 3) is wanted, got {A.shape}")
+    w = np.ones(A.shape[-3]) if weights is None else as_finite("weights", weights, A.shape[-3])
+    check_all(w > 0, "weights", w, "a number above 0")
+    check_broadcast(rotations=(A, 3), weights=(w, 1))
+    share = (w / w.sum(axis=-1, keepdims=True))[..., None, None]
+    R, unique = nearest(np.sum(share * A[..., :3, :3], axis=-3))
+    if not unique.all():
+        raise ValueError("rotations: their mean is not unique, as of rotations a half-turn apart")
+    if A.shape[-1] == 3:
+        return R
+    return join(R, np.sum(share[..., 0] * A[..., :3, 3], axis=-2))

@@ -2,6 +2,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 from rbcourse import metrics
@@ -192,3 +193,44 @@ def test_arguments_that_do_not_fit_each_other_are_refused():
     ):
         with pytest.raises(ValueError, match=f"^{re.escape(message)}"):
             getattr(metrics, name)(*arguments)
+
+
+@pytest.mark.source("BK 4", "BK Prop. 2")
+def test_the_mean_rotation_has_the_least_sum_of_squared_distances():
+    rng = np.random.default_rng(90)
+    R = rb.exp_so3(0.4 * rng.normal(size=(5, 12, 3)))
+    w = rng.uniform(0.1, 2, (5, 12))
+    mean = rb.metrics.mean_rotation(R, w)
+    assert rb.is_so(mean, 1e-14).all()
+
+    def cost(x):
+        moved = (mean @ rb.exp_so3(x))[:, None]
+        return np.sum(w * np.sum((moved - R) ** 2, axis=(-2, -1)), axis=-1)
+
+    for step in 1e-3 * rng.normal(size=(20, 3)):
+        assert (cost(step) > cost(0 * step)).all()
+        assert np.abs(cost(step) - cost(-step)).max() < 1e-7  # the gradient is 0
+    for k in range(5):
+        theirs = Rotation.from_matrix(R[k]).mean(w[k]).as_matrix()
+        assert np.abs(mean[k] - theirs).max() < 1e-13
+    L, Q = rb.exp_so3(rng.normal(size=(2, 3)))
+    assert np.abs(rb.metrics.mean_rotation(L @ R @ Q, w) - L @ mean @ Q).max() < 1e-14
+    d = rng.normal(size=(5, 12, 3))
+    poses = rb.metrics.mean_rotation(rb.pose_from_components(R, d), w)
+    assert np.abs(poses[:, :3, :3] - mean).max() < 1e-15
+    assert np.abs(poses[:, :3, 3] - np.einsum("ki,kij->kj", w, d) / w.sum(1)[:, None]).max() < 1e-14
+
+
+def test_a_mean_rotation_that_is_not_unique_is_refused():
+    half_turn = rb.exp_so3([[0, 0, 0], [0, 0, np.pi]])
+    with pytest.raises(ValueError, match="rotations: their mean is not unique"):
+        rb.metrics.mean_rotation(half_turn)
+    assert np.abs(rb.metrics.mean_rotation(half_turn, [2, 1]) - np.eye(3)).max() < 1e-15
+    for weights, message in (([1, -1], r"weights\[1\] is -1"), ([1], "weights: shape")):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            rb.metrics.mean_rotation(half_turn, weights)
+    with pytest.raises(ValueError, match=r"^rotations: shape"):
+        rb.metrics.mean_rotation(np.eye(3))
+    far = rb.exp_so3(np.random.default_rng(5).normal(size=(300, 4, 3)))
+    near = rb.exp_so3(0.99 * np.pi / 2 * rb.log_so3(far) / np.pi)  # within 90° of I
+    assert rb.is_so(rb.metrics.mean_rotation(near), 1e-12).all()

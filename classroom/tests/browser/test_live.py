@@ -198,7 +198,7 @@ def test_a_changed_cell_can_be_stopped_and_reset(page, address):
     code.press("Shift+Enter")
     expect(part.locator(".outputs pre")).to_have_text("42")
     part.get_by_role("button", name="Reset").click()
-    expect(code).to_contain_text("save_figure")
+    expect(code).to_contain_text("paper.figure_1")
     assert part.locator(".cell_output").first.get_by_role("button").count() == before
 
 
