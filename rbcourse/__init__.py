@@ -17,7 +17,8 @@ state which body moves                       Body(inertia, mass, centre), Body.b
 pass through many poses with continuous      projected_spline (for any body), quaternion_spline;
 acceleration                                 joined, for a rotation and a position
 join them with given velocities              chain
-pass near noisy poses                        smoothing_spline
+pass near noisy poses                        smoothing_spline, or with the least cost
+                                             optimum.minimum_acceleration_smoothing
 pass through them with the least cost        minimum_acceleration_spline (for any body); for
                                              rotations, minimum_torque_spline, minimum_jerk_spline
 evaluate a curve c                           c(t), c(t, 1), c(t, 2); c.state(t) for all three

@@ -56,6 +56,12 @@ from numpy.typing import NDArray
 
 from rbcourse._docs import described_by
 from rbcourse.curves.bezier import corrected_bezier
+from rbcourse.quaternion import (
+    continuous_quaternions,
+    matrix_from_quaternion,
+    project_quaternion,
+    quaternion_from_matrix,
+)
 from rbcourse.sampling import arvo_rotation, shoemake_quaternion
 from rbcourse.so3 import exp_so3, hat_so3, log_so3, right_jacobian_inverse_so3, vee_so3
 
@@ -75,6 +81,7 @@ __all__ = [
     "sample_rotation",
     "shoot",
     "show",
+    "smoothing_spline",
     "spline_velocities",
 ]
 
@@ -382,6 +389,43 @@ def spline_velocities(times: Array, R: Array) -> Array:
         b[i] += 6 * s / h**2
         b[i + 1] += 6 * s / h**2
     return np.linalg.solve(H.reshape(b.size, b.size), b.ravel()).reshape(b.shape)
+
+
+def smoothing_spline(times: Array, R: Array, smoothing: float, t: Array) -> Array:
+    """Return the projected smoothing spline near noisy rotations R, at the times t, by SciPy.
+
+    The spline M of the matrices, projected, has the angular velocity w. The quaternions q near the
+    rotations shall have q'' = −¼ ‖w‖² q without a cost. Twice integrated, this is a function x(t),
+    and the other part q − x is a smoothing spline.
+    Source: beyond BK 17.
+
+    Parameters
+    ----------
+    smoothing : float
+        The factor λ of ∫ ‖M'' ‖² dt, in the cube of the unit of time.
+
+    Examples
+    --------
+    >>> times = np.arange(9.0)
+    >>> R = smoothing_spline(times, exp_so3(times[:, None] * [0, 0, 0.5]), 1.0, times[4:5])
+    >>> log_so3(R).round(3) + 0.0
+    array([[0., 0., 2.]])
+    """
+    from scipy.interpolate import make_interp_spline, make_smoothing_spline
+
+    def smoothed(values: Array, t: Array, order: int = 0) -> Array:
+        splines = [make_smoothing_spline(times, column, lam=smoothing) for column in values.T]
+        return np.stack([spline(t, order) for spline in splines], axis=-1)
+
+    M, M_rate = (smoothed(R.reshape(-1, 9), times, k).reshape(R.shape) for k in (0, 1))
+    near = project_so(M)
+    S, A = near.mT @ M, near.mT @ M_rate
+    w = np.linalg.solve(_spin(S), 2 * vee_so3(A)[..., None])
+    q, data = continuous_quaternions(quaternion_from_matrix(near)), quaternion_from_matrix(R)
+    data = data * np.sign(np.sum(data * q, axis=1, keepdims=True))
+    bend = -np.sum(w * w, axis=1) / 4 * q
+    x = make_interp_spline(times, bend, k=1).antiderivative(2)
+    return matrix_from_quaternion(project_quaternion(smoothed(data - x(times), t) + x(t)))
 
 
 def minimum_acceleration_spline(

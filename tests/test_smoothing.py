@@ -1,20 +1,26 @@
 """Test smooth curves near noisy rotations and poses by their definitions and by SciPy."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import recording
 from scipy.interpolate import CubicHermiteSpline, make_smoothing_spline
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.curves.smoothing import Smoother
+from rbcourse.curves.smoothing import Smoother, checked_problem, closed_form
+from rbcourse.optimum import minimum_acceleration_smoothing
+from rbcourse.optimum._spline import responses_of
+from rbcourse.optimum.smoothing import _Problem
 
 RNG = np.random.default_rng(79)
 T = np.cumsum(RNG.uniform(0.5, 1.5, 40))
 W = RNG.uniform(0.5, 2, 40)
+METHODS = rb.smoothing_spline, minimum_acceleration_smoothing
 FINE = np.linspace(T[0], T[-1], 201)
 
 
@@ -32,21 +38,22 @@ POSES = rb.pose_from_components(NOISY, PLACES + 0.01 * RNG.normal(size=(40, 3)))
 
 
 def test_without_bend_the_smoother_is_scipys_smoothing_spline():
-    y = RNG.normal(size=(40, 3))
+    y = np.random.default_rng(7).normal(size=(40, 3))
     smoother = Smoother(T, W, "natural")
     for smoothing in (1e-3, 1.0, 1e3):
         lam = smoothing * W.mean() * smoother.unit**3
-        theirs = make_smoothing_spline(T, y, w=W, lam=lam)
         values, rates = smoother.fit(y, smoothing)
-        assert np.abs(values - theirs(T)).max() < 1e-12
-        assert np.abs(rates - theirs(T, 1)).max() < 1e-11
+        for column, value, rate in zip(y.T, values.T, rates.T, strict=True):
+            theirs = make_smoothing_spline(T, column, w=W, lam=lam)
+            assert np.abs(value - theirs(T)).max() < 1e-12
+            assert np.abs(rate - theirs(T, 1)).max() < 1e-11
 
 
 @pytest.mark.parametrize("ends", ["natural", "rest"])
 def test_the_smoother_has_the_least_cost(ends):
     """The cost of values and rates is quadratic; least squares solves for them."""
     t, w = T[:9], W[:9]
-    smoother, bend, y = Smoother(t, w, ends), RNG.normal(size=9), RNG.normal(size=9)
+    smoother, bend, y = Smoother(t, w, ends), *np.random.default_rng(7).normal(size=(2, 9))
     smoothing = 0.7
     nodes, shares = np.polynomial.legendre.leggauss(4)
     u, lam = (nodes + 1) / 2, smoothing * w.mean() * smoother.unit**3
@@ -88,9 +95,10 @@ def test_an_oscillation_of_the_period_keeps_half_of_its_amplitude():
     assert kept @ wave[1000:3000] / 1000 == pytest.approx(0.5, rel=1e-3)
 
 
+@pytest.mark.parametrize("make", METHODS)
 @pytest.mark.parametrize("data", [NOISY, POSES], ids=["rotations", "poses"])
-def test_velocity_and_acceleration_are_continuous(data):
-    c = rb.smoothing_spline(T, data, weights=W)
+def test_velocity_and_acceleration_are_continuous(data, make):
+    c = make(T, data, weights=W)
     for order in (1, 2):
         sizes = np.abs(c(FINE, order)).max()
         assert np.abs(c.jumps(order)).max() < 1e-10 * max(1, sizes)
@@ -102,51 +110,56 @@ def test_velocity_and_acceleration_are_continuous(data):
             rate = c(FINE[1:-1], order + 1)
             middle = np.abs(FINE[1:-1, None] - T).min(axis=1) > 2 * step
             assert np.abs((later - before) / (2 * step) - rate)[middle].max() < 1e-6
-    rest = rb.smoothing_spline(T, data, "rest")
+    rest = make(T, data, "rest")
     assert np.abs(rest(T[[0, -1]], 1)).max() < 1e-12
 
 
-def test_moved_reversed_and_rescaled_rotations_give_the_same_curve():
-    L, Q = Rotation.random(2, RNG).as_matrix()
-    c = rb.smoothing_spline(T, NOISY, weights=W)
-    moved = rb.smoothing_spline(T, L @ NOISY @ Q, weights=W)
-    back = rb.smoothing_spline(-T[::-1], NOISY[::-1], weights=W[::-1])
-    slow = rb.smoothing_spline(1e3 * T, NOISY, weights=5 * W)
+@pytest.mark.parametrize("make", METHODS)
+def test_moved_reversed_and_rescaled_rotations_give_the_same_curve(make):
+    L, Q = Rotation.random(2, np.random.default_rng(7)).as_matrix()
+    c = make(T, NOISY, weights=W)
+    moved = make(T, L @ NOISY @ Q, weights=W)
+    back = make(-T[::-1], NOISY[::-1], weights=W[::-1])
+    slow = make(1e3 * T, NOISY, weights=5 * W)
     assert np.abs(L @ c(FINE) @ Q - moved(FINE)).max() < 1e-10
     assert np.abs(c(FINE) - back(-FINE)).max() < 1e-10
     assert np.abs(c(T) - slow(1e3 * T)).max() < 1e-10
     assert slow.period == pytest.approx(1e3 * c.period)
     assert slow.noise == pytest.approx(5**0.5 * c.noise)
-    twice = rb.smoothing_spline(
-        np.repeat(T, 2), np.repeat(NOISY, 2, axis=0), weights=np.repeat(W, 2), period=c.period
-    )
-    assert np.abs(twice(FINE) - c.retimed(c.duration)(FINE)).max() > 0
-    same = rb.smoothing_spline(T, NOISY, weights=2 * W, period=c.period)
+    repeated = np.repeat(T, 2), np.repeat(NOISY, 2, axis=0)
+    twice = make(*repeated, weights=np.repeat(W, 2), period=c.period)
+    same = make(T, NOISY, weights=2 * W, period=c.period)
     assert np.abs(twice(FINE) - same(FINE)).max() < 1e-12
     longer = c.retimed(2 * float(c.duration))
     assert longer.period == pytest.approx(2 * c.period)
 
 
-def test_moved_poses_give_the_moved_curve():
+@pytest.mark.parametrize("make", METHODS)
+def test_moved_poses_give_the_moved_curve(make):
     L = rb.pose_from_coordinates([0.3, -1, 2, 1, 2, 3])
     Q = rb.pose_from_coordinates([1, 0.2, 0.1, 0, 0, 0])  # keeps the origin
-    c, moved = rb.smoothing_spline(T, POSES), rb.smoothing_spline(T, L @ POSES @ Q)
+    c, moved = make(T, POSES), make(T, L @ POSES @ Q)
     assert np.abs(L @ c(FINE) @ Q - moved(FINE)).max() < 1e-9
-    rotations = rb.smoothing_spline(T, POSES[:, :3, :3])
+    rotations = make(T, POSES[:, :3, :3])
     assert np.abs(c(FINE)[:, :3, :3] - rotations(FINE)).max() < 1e-14
     assert c.period[0] == rotations.period
-    path = make_smoothing_spline(T, POSES[:, :3, 3], lam=_lam(c.period[1]))
-    assert np.abs(c(T)[:, :3, 3] - path(T)).max() < 1e-12
+    for column, path in zip(POSES[:, :3, 3].T, c(T)[:, :3, 3].T, strict=True):
+        theirs = make_smoothing_spline(T, column, lam=_lam(c.period[1]))
+        assert np.abs(path - theirs(T)).max() < 1e-12
 
 
 def _lam(period):
     return (period / (2 * np.pi)) ** 4 / np.diff(T).mean()
 
 
-def test_rotations_about_one_axis_follow_the_spline_of_the_angle():
-    for noise, bound in ((0.1, 1e-3), (0.01, 1e-4)):
-        angle = 0.3 * np.sin(T / 4) + noise * RNG.normal(size=40)
-        c = rb.smoothing_spline(T, rb.exp_so3(angle[:, None] * [0, 0, 1]), period=10)
+BOUNDS = [(METHODS[0], (1e-3, 1e-4)), (METHODS[1], (3e-4, 1e-6))]
+
+
+@pytest.mark.parametrize(("make", "bounds"), BOUNDS)
+def test_rotations_about_one_axis_follow_the_spline_of_the_angle(make, bounds):
+    for noise, bound in zip((0.1, 0.01), bounds, strict=True):
+        angle = 0.3 * np.sin(T / 4) + noise * np.random.default_rng(7).normal(size=40)
+        c = make(T, rb.exp_so3(angle[:, None] * [0, 0, 1]), period=10)
         theirs = make_smoothing_spline(T, angle, lam=_lam(10))(T)
         assert np.abs(rb.log_so3(c(T))[:, 2] - theirs).max() < bound
 
@@ -170,7 +183,7 @@ def test_a_short_period_interpolates_and_a_long_one_gives_a_steady_turn():
     spline = rb.quaternion_spline(T, NOISY)
     assert np.abs(c(FINE) - spline(FINE)).max() < 1e-3
     steady = rb.exp_so3(T[:, None] * [0.002, 0.001, 0.003])
-    measured = steady @ rb.exp_so3(1e-3 * RNG.normal(size=(40, 3)))
+    measured = steady @ rb.exp_so3(1e-3 * np.random.default_rng(7).normal(size=(40, 3)))
     c = rb.smoothing_spline(T, measured, period=500)
     assert np.abs(c(FINE, 2)).max() < 1e-7
     assert np.abs(c(T) - steady).max() < 1e-3
@@ -192,7 +205,7 @@ def test_the_fastest_motion_along_a_noisy_recording_takes_hardly_longer():
 def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
     t = np.arange(100.0)
     R, measured = wandering(t, 0.05, 0.02)
-    measured[[7, 40, 41, 80]] = Rotation.random(4, RNG).as_matrix()
+    measured[[7, 40, 41, 80]] = Rotation.random(4, np.random.default_rng(7)).as_matrix()
     w = np.ones(100)
     with warnings.catch_warnings(action="ignore"):
         for _ in range(5):
@@ -234,3 +247,126 @@ def test_bad_arguments_are_named(options, message):
     if options.keys() & {"noise"}:
         with pytest.raises(ValueError, match=r"^noise: a pair"):
             rb.smoothing_spline(T, POSES, noise=0.1)
+
+
+# the optimum
+
+
+def _pulls(c):
+    """Return 2 λ times the jumps of c, and vee(R Dᵀ − D Rᵀ), at the knots."""
+    lam = (c.period / (2 * np.pi)) ** 4 * W.mean() / np.diff(T).mean()
+    A = c(T) @ (W[:, None, None] * NOISY).mT
+    return 2 * lam * np.diff(np.pad(c.c, [(1, 1), (0, 0)]), axis=0), rb.vee_so3(A - A.mT)
+
+
+def test_the_costate_of_the_optimum_jumps_by_the_pull_of_the_measurement():
+    for options in ({}, {"period": 5.0}, {"noise": 0.03}, {"period": 60.0}):
+        c = minimum_acceleration_smoothing(T, NOISY, weights=W, **options)
+        jumps, pulls = _pulls(c)
+        assert np.abs(jumps + pulls).max() < 1e-10
+        assert np.abs(pulls.sum(axis=0)).max() < 1e-10
+        assert np.abs(c(T[[0, -1]], 2)).max() < 1e-10
+        assert c.certified
+        assert c.cost == pytest.approx(rb.acceleration_cost(c), rel=1e-10)
+
+
+def _sum(knots, w, problem, smoothing):
+    """Return Σ wᵢ (3 − tr RᵢᵀR) + λ ∫ ‖w'‖² dt with optima between the knots."""
+    c = rb.minimum_acceleration(knots[:-1], knots[1:], w[:-1], w[1:], duration=problem.h)
+    far = 3 * problem.smoother.weights.sum() / problem.smoother.total.mean()
+    return far - np.sum(problem.D * knots) + smoothing * np.sum(c.cost) / 2
+
+
+def test_the_linear_system_has_the_derivatives_of_the_sum():
+    """The changes of the sum by ± turns and velocities are odd and even in the change."""
+    R, smoothing, step = wandering(T[:6], 0.5, 0.3)[1], 0.7, 1e-4
+    _, smoother, *_ = checked_problem(T[:6], R, "natural", None, None, W[:6])
+    problem = _Problem.of(smoother, R, "natural")
+    curve = closed_form(smoother, R, None, smoother.period(smoothing))
+    legs = rb.minimum_acceleration(
+        *(curve(T[i]) for i in (slice(5), slice(1, 6))),
+        *(curve(T[i], 1) for i in (slice(5), slice(1, 6))),
+        duration=np.diff(T[:6]),
+    )
+    state = problem.start(replace(curve, legs=legs))
+    now = problem.legs(state)
+    system = problem.system(state, now, responses_of(now), smoothing)
+    knots = state.knots
+    for change in np.random.default_rng(7).normal(size=(3, 6, 6)):
+        turn, dw = change[:, :3], change[:, 3:]
+        up, mid, down = (
+            _sum(rb.exp_so3(x * turn) @ knots, state.w + x * dw, problem, smoothing)
+            for x in (step, 0, -step)
+        )
+        x, y = change[:-1], change[1:]
+        slope = -np.sum(system.b0 * x) - np.sum(system.b1 * y)
+        bend = np.einsum("ia,iab,ib", x, system.A, x) + np.einsum("ia,iab,ib", y, system.D, y)
+        bend += 2 * np.einsum("ia,iab,ib", x, system.B, y)
+        assert (up - down) / (2 * step) == pytest.approx(slope, rel=1e-4)
+        assert (up - 2 * mid + down) / step**2 == pytest.approx(bend, rel=1e-4)
+
+
+def test_the_optimum_ranges_from_the_interpolating_one_to_the_best_steady_turn():
+    t, R = T[:8], wandering(T[:8], 0.4, 0.1)[1]
+    tight = minimum_acceleration_smoothing(t, R, period=1e-2)
+    through = rb.minimum_acceleration_spline(t, R)
+    fine = np.linspace(t[0], t[-1], 99)
+    assert np.abs(tight(fine) - through(fine)).max() < 1e-8
+    assert tight.cost == pytest.approx(through.cost, rel=1e-8)
+
+    def off(x):
+        return (rb.exp_so3(x[:3]) @ rb.exp_so3(t[:, None] * x[3:]) - R).ravel()
+
+    exact = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-15)
+    best = least_squares(off, np.append(rb.log_so3(R[0]), [0.4, 0.4, 0]), **exact).x
+    steady = rb.exp_so3(best[:3]) @ rb.exp_so3(t[:, None] * best[3:])
+    apart = [
+        np.abs(minimum_acceleration_smoothing(t, R, period=x)(t) - steady).max()
+        for x in (100.0, 200.0)
+    ]
+    assert apart[0] < 1e-4
+    assert apart[1] == pytest.approx(apart[0] / 16, rel=0.02)
+
+
+def test_the_optimum_is_found_where_the_closed_form_is_far_from_it():
+    t = np.arange(30.0)
+    for step in (0.3, 0.8, 1.5):
+        measured = wandering(t, step, step / 6)[1]
+        period = 2 * np.pi * 1.5 / step
+        c = minimum_acceleration_smoothing(t, measured, period=period)
+        with pytest.warns(RuntimeWarning, match=r"optimum\.minimum_acceleration_smoothing"):
+            near = rb.smoothing_spline(t, measured, period=period)
+        lam = (period / (2 * np.pi)) ** 4
+        of_both = [
+            np.sum((x(t) - measured) ** 2) + lam * rb.acceleration_cost(x) for x in (c, near)
+        ]
+        assert c.certified
+        assert of_both[0] < 0.98 * of_both[1]
+
+
+def test_the_optimum_finds_its_own_period():
+    """At 60° a step, the cross validation of the closed form finds nothing to smooth."""
+    t, rng = np.arange(60.0), np.random.default_rng(5)
+    turns = np.cumsum(rng.normal(scale=0.3, size=(60, 3)), axis=0) / 4 + [0.6, 0.6, 0.6]
+    R = np.array([np.eye(3)] * 60)
+    for i in range(1, 60):
+        R[i] = R[i - 1] @ rb.exp_so3(turns[i])
+    measured = R @ rb.exp_so3(0.1 * rng.normal(size=(60, 3)))
+    c = minimum_acceleration_smoothing(t, measured)
+    lams = (c.period / (2 * np.pi)) ** 4 * np.exp([-0.75, 0, 0.75])
+    smoother = Smoother(t, np.ones(60), "natural")
+    scores = []
+    for lam in lams:
+        near = minimum_acceleration_smoothing(t, measured, period=2 * np.pi * lam**0.25)
+        misfit = np.sum((near(t) - measured) ** 2) / 2
+        scores.append(np.log(misfit) - 2 * np.log(smoother.freedom(lam)))
+    assert scores[1] < min(scores[0], scores[2])
+    assert c.certified
+    longer = c.retimed(2 * c.domain[1])
+    assert longer.period == pytest.approx(2 * c.period)
+
+
+def test_an_optimum_that_is_not_found_raises_an_error():
+    R = Rotation.random(12, np.random.default_rng(1)).as_matrix()
+    with pytest.raises(rb.optimum.ConvergenceError, match="body may turn too far in the time"):
+        minimum_acceleration_smoothing(np.arange(12), R, period=100)

@@ -47,6 +47,19 @@ def test_the_optima_agree_with_the_textbook(turn, w0, w1):
             assert np.abs(curve(TIMES, order) - want).max() < bound * max(1, np.abs(want).max())
 
 
+@pytest.mark.source("beyond BK 17")
+@pytest.mark.parametrize("turn", [0.05, 0.3])
+def test_smoothing_splines_agree_with_the_textbook(turn):
+    rng = np.random.default_rng(17)
+    times = np.cumsum(rng.uniform(0.5, 1.5, 30))
+    t = np.linspace(times[0], times[-1], 99)
+    vectors = turn * np.stack([7 * np.sin(times / 7), times, 5 * np.cos(times / 5)], axis=-1)
+    R = rb.exp_so3(vectors) @ rb.exp_so3(0.02 * rng.normal(size=(30, 3)))
+    c = rb.smoothing_spline(times, R, period=8)
+    smoothing = (8 / (2 * np.pi)) ** 4 / np.diff(times).mean()
+    assert np.abs(c(t) - textbook.smoothing_spline(times, R, smoothing, t)).max() < 1e-12
+
+
 @pytest.mark.source("BK (20)", "BK 6.2", "BK Fig. 4", "BK Fig. 5")
 @pytest.mark.parametrize("case", PAPER)
 def test_shooting_reaches_the_optimum(case):

@@ -39,7 +39,7 @@ from rbcourse.projection import nearest
 from rbcourse.quaternion import continuous_quaternions, quaternion_conjugate, quaternion_multiply
 from rbcourse.so3 import vee
 
-_LEAST, _STEP, _MOST = -12.0, 1.5, 28.0  # of log λ, if the mean step and the mean weight are 1
+LEAST, STEP, MOST = -12.0, 1.5, 28.0  # of log λ, if the mean step and the mean weight are 1
 _DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
 
 
@@ -77,7 +77,7 @@ def smoothing_spline(
 ) -> SmoothedChain:
     """Return a smooth curve near noisy rotations or poses: a smoothing spline, projected.
 
-    Source: BK 4, BK 6.
+    Source: BK 4, BK 6; beyond BK 17.
 
     Parameters
     ----------
@@ -132,51 +132,50 @@ def smoothing_spline(
     >>> c(0.5, 1).round(1) + 0.0, round(c.noise, 2)
     (array([0., 0., 2.]), 0.02)
     """
+    A, smoother, noises, periods = checked_problem(times, poses, ends, noise, period, weights)
+    R = A[:, :3, :3]
+    c = closed_form(smoother, R, noises[0], periods[0])
+    turn = c.period / (2 * np.pi) * np.sqrt(np.mean(np.sum(c.velocities**2, axis=1)))
+    if turn > _DOMAIN:
+        warnings.warn(
+            f"the body turns by {turn:.2g} rad in the time period/2π, and the closed form is near "
+            f"the optimum up to {_DOMAIN:g} rad; choose a shorter period, or "
+            "rbcourse.optimum.minimum_acceleration_smoothing",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    if A.shape[-1] == 4:
+        c = with_origins(c, RigidMotion, smoother, A[:, :3, 3], noises[1], periods[1])
+    if noise is None and period is None:
+        smoother.check_noise(c.period)
+    return c
+
+
+def checked_problem(
+    times: ArrayLike,
+    poses: ArrayLike,
+    ends: str,
+    noise: ArrayLike | None,
+    period: ArrayLike | None,
+    weights: ArrayLike | None,
+) -> tuple[Array, Smoother, Sequence[float | None], Sequence[float | None]]:
+    """Return poses, their `Smoother`, and a noise and a period for each part, or None."""
     A, size = as_rotations_or_poses("poses", poses)
     times, w = _checked_data(times, A, weights)
     if noise is not None and period is not None:
         raise ValueError("noise, period: one of them is wanted, got both")
     parts = size // 3
-    of = [_as_pair("noise", noise, parts, alike=False), _as_pair("period", period, parts)]
-    smoother = Smoother(times, w, ends)
-    turning = _smoothed_rotations(smoother, A[:, :3, :3], of[0][0], of[1][0])
-    if parts == 1:
-        return turning
-    d = A[:, :3, 3]
-
-    def misfit(smoothing: float) -> float:
-        return smoother.sum_of(d - smoother.fit(d, smoothing)[0][smoother.which])
-
-    found = smoother.best(misfit, of[0][1], of[1][1])
-    x, v = smoother.fit(d, found.smoothing)
-    h = turning.legs.duration[:, None]
-    path = np.stack([x[:-1], x[1:], h * v[:-1], h * v[1:]], axis=-2)
-    legs = RigidMotion(duration=turning.legs.duration, rotation=turning.legs, path=path)
-    R = turning(turning.times)
-    return replace(
-        turning,
-        legs=legs,
-        velocities=np.append(turning.velocities, matvec(R.mT, v), axis=1),
-        period=np.array([turning.period, found.period]),
-        noise=np.array([turning.noise, found.noise]),
-    )
+    noises = _as_pair("noise", noise, parts, alike=False)
+    return A, Smoother(times, w, ends), noises, _as_pair("period", period, parts)
 
 
-def _smoothed_rotations(
+def closed_form(
     smoother: Smoother, R: Array, noise: float | None, period: float | None
 ) -> SmoothedChain:
+    """Return the smooth curve near rotations."""
     found = smoother.best(lambda x: _quaternions(smoother, R, x)[2], noise, period)
     q, rates, _ = _quaternions(smoother, R, found.smoothing)
     inverse = quaternion_conjugate(q) / np.sum(q * q, axis=1, keepdims=True)
-    w = 2 * quaternion_multiply(inverse, rates)[:, 1:]
-    turn = found.period / (2 * np.pi) * np.sqrt(np.mean(np.sum(w * w, axis=1)))
-    if turn > _DOMAIN:
-        warnings.warn(
-            f"the body turns by {turn:.2g} rad in the time period/2π, and the closed form is near "
-            f"the optimum up to {_DOMAIN:g} rad; choose a shorter period",
-            RuntimeWarning,
-            stacklevel=3,
-        )
     h = np.diff(smoother.knots)[:, None]
     controls = np.stack([q[:-1], q[1:], h * rates[:-1], h * rates[1:]], axis=-2)
     one = np.broadcast_to(np.eye(4)[0], (len(h), 4))
@@ -184,9 +183,36 @@ def _smoothed_rotations(
         duration=np.array(smoother.knots[-1] - smoother.knots[0]),
         times=smoother.knots,
         legs=QuaternionCubic(duration=h[:, 0], start=one, controls=controls),
-        velocities=w,
+        velocities=2 * quaternion_multiply(inverse, rates)[:, 1:],
         period=found.period,
         noise=found.noise,
+    )
+
+
+def with_origins(
+    turning: Any,
+    legs: type[RigidMotion],
+    smoother: Smoother,
+    d: Array,
+    noise: float | None,
+    period: float | None,
+) -> Any:
+    """Return a smooth curve near poses: rotations, and a smoothing spline near the origins d."""
+
+    def misfit(smoothing: float) -> float:
+        return smoother.sum_of(d - smoother.fit(d, smoothing)[0][smoother.which])
+
+    found = smoother.best(misfit, noise, period)
+    x, v = smoother.fit(d, found.smoothing)
+    h = np.diff(smoother.knots)[:, None]
+    path = np.stack([x[:-1], x[1:], h * v[:-1], h * v[1:]], axis=-2)
+    R = turning(turning.times)
+    return replace(
+        turning,
+        legs=legs(duration=h[:, 0], body=turning.body, rotation=turning.legs, path=path),
+        velocities=np.append(turning.velocities, matvec(R.mT, v), axis=1),
+        period=np.array([turning.period, found.period]),
+        noise=np.array([turning.noise, found.noise]),
     )
 
 
@@ -312,35 +338,51 @@ class Smoother:
         slope = np.dot([1, -8, 8, -1], logs) / (12 * 0.01)
         return len(self.weights) - len(self.knots) + 2 * float(slope)
 
+    def score(self, misfit: float, smoothing: float, noise: float | None) -> float:
+        """Return the expected error up to a constant or, without a noise, the cross validation.
+
+        The misfit is Σ wᵢ ‖rᵢ‖², where rᵢ has three components.
+        """
+        free = self.freedom(smoothing)
+        if noise is not None:
+            return misfit - 6 * noise**2 * free
+        return float(np.log(max(misfit, 1e-300)) - 2 * np.log(free))
+
     def best(
         self, misfit: Callable[[float], float], noise: float | None, period: float | None
     ) -> Smoothing:
-        """Return the smoothing of a noise or a period, or by cross validation.
-
-        ``misfit(smoothing)`` is Σ wᵢ ‖rᵢ‖², where rᵢ has three components.
-        """
+        """Return the smoothing for a noise or a period or, without them, by cross validation."""
         from scipy.optimize import minimize_scalar
 
         def score(log: float) -> float:
-            free, left = self.freedom(np.exp(log)), misfit(float(np.exp(log)))
-            if noise is not None:  # the expected error, up to a constant
-                return left - 6 * noise**2 * free
-            return float(np.log(max(left, 1e-300)) - 2 * np.log(free))
+            smoothing = float(np.exp(log))
+            return self.score(misfit(smoothing), smoothing, noise)
 
         if period is not None:
             smoothing = (period / (2 * np.pi * self.unit)) ** 4
         else:
-            logs = np.arange(_LEAST, min(4 * np.log(len(self.knots)), _MOST), _STEP)
+            logs = np.arange(LEAST, min(4 * np.log(len(self.knots)), MOST), STEP)
             best = logs[np.argmin([score(x) for x in logs])]
-            bounds, options = (best - _STEP, best + _STEP), {"xatol": 0.05}
+            bounds, options = (best - STEP, best + STEP), {"xatol": 0.05}
             found = minimize_scalar(score, bounds=bounds, method="bounded", options=options)
             smoothing = float(np.exp(found.x))
-            if best == logs[0]:
-                warnings.warn(
-                    "cross validation finds nothing to smooth, so the noise is not known; give "
-                    "noise or period",
-                    RuntimeWarning,
-                    stacklevel=4,
-                )
-        noise = np.sqrt(misfit(smoothing) / (3 * self.freedom(smoothing)))
-        return Smoothing(smoothing, 2 * np.pi * self.unit * smoothing**0.25, float(noise))
+        return self.found(misfit(smoothing), smoothing)
+
+    def found(self, misfit: float, smoothing: float) -> Smoothing:
+        """Return a smoothing with its period, and with the noise that its misfit shows."""
+        noise = np.sqrt(misfit / (3 * self.freedom(smoothing)))
+        return Smoothing(smoothing, self.period(smoothing), float(noise))
+
+    def period(self, smoothing: float) -> float:
+        """Return the period of which an oscillation keeps half of its amplitude."""
+        return float(2 * np.pi * self.unit * smoothing**0.25)
+
+    def check_noise(self, periods: Any) -> None:
+        """Warn if the best of the tried periods is the least one."""
+        if np.min(periods) < self.period(np.exp(LEAST + STEP)):
+            warnings.warn(
+                "cross validation finds nothing to smooth, so the noise is not known; give "
+                "noise or period",
+                RuntimeWarning,
+                stacklevel=3,
+            )

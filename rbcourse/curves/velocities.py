@@ -122,7 +122,10 @@ def path_velocities(h: Array, poses: Array, w: Array, conditions: Conditions, r:
 
 
 class Conditions(NamedTuple):
-    """End conditions: `given` values, shape (N, m), at the knots that are `fixed`; 0 elsewhere."""
+    """End conditions: `given` values, shape (N, m), at the knots that are `fixed`; 0 elsewhere.
+
+    If the shape of `fixed` is (N, m), it tells which of the values are fixed.
+    """
 
     fixed: NDArray[np.bool_]
     given: Array
@@ -168,8 +171,10 @@ class KnotSystem(NamedTuple):
         if given.any():
             x, y = given[:-1], given[1:]
             load = load - at_knots(self.A @ x + self.B @ y, self.B.mT @ x + self.D @ y)
-        on[fixed], load[fixed] = np.eye(m), 0
-        above = np.where((fixed[1:] | fixed[:-1])[:, None, None], 0, self.B)
+        free = np.broadcast_to(~fixed.reshape(count, -1), (count, m))
+        on = np.where(free[:, :, None] & free[:, None], on, np.eye(m))
+        load = np.where(free[..., None], load, 0)
+        above = np.where(free[:-1, :, None] & free[1:, None], self.B, 0)
         band = np.zeros((2 * m, m * count))
         for q in range(m):
             band[: m - q, q::m] = on[:, q:, q].T

@@ -5,16 +5,15 @@ In private modules, `_search` chooses starting curves, `_guesses` makes them and
 path together, and `_second_variation` proves that a solution is a local minimum.
 """
 
-from rbcourse.optimum._result import Optimum
+from rbcourse.optimum._result import ConvergenceError, OptimalChain, Optimum
 from rbcourse.optimum.excess import excess_estimate
 from rbcourse.optimum.many_poses import (
-    OptimalChain,
     minimum_acceleration_spline,
     minimum_jerk_spline,
     minimum_torque_spline,
 )
+from rbcourse.optimum.smoothing import minimum_acceleration_smoothing
 from rbcourse.optimum.two_poses import (
-    ConvergenceError,
     minimum_acceleration,
     minimum_jerk,
     minimum_torque,
@@ -27,6 +26,7 @@ __all__ = [
     "Optimum",
     "excess_estimate",
     "minimum_acceleration",
+    "minimum_acceleration_smoothing",
     "minimum_acceleration_spline",
     "minimum_jerk",
     "minimum_jerk_spline",

@@ -425,6 +425,18 @@ class BallStationary(Stationary):
 
             ε = d + ∫ R K Rᵀ(ĉ ε + δc) dt,    ε(1) = 0.
 
+        `effects` solves the first equation, and the second one gives δc.
+        """
+        by_d, by_c = self.effects(now, errors, by_ends)
+        dc = -solve(by_c[:, -1], by_d[:, -1])
+        turn = by_d + by_c @ dc[:, None]
+        if not by_ends:  # δk is not needed, since `unknowns` computes k
+            return Change(turn, np.zeros_like(turn), dc)
+        return Change(turn, turned_rate(now, turn, dc), dc)
+
+    def effects(self, now: Unknowns, errors: Errors, by_ends: bool) -> tuple[Array, Array]:
+        """Return ε at the nodes for each column of d, and for unit vectors δc.
+
         The equation is solved for ĉ ε on the `coarse` nodes. Then the right side gives ε on all
         nodes. The integrals smooth the error, so this ε is as accurate as a solution on all nodes.
         """
@@ -438,14 +450,12 @@ class BallStationary(Stationary):
         Rt = np.ascontiguousarray(R.mT)  # faster to multiply
         w = along(primitives(n, 2).from_k[0], Rt @ causes)
         turns = integrals(R @ w)
-        by_d = turns[..., :-3] + d
-        by_c = turns[..., -3:]
-        dc = -solve(by_c[:, -1], by_d[:, -1])
-        turn = by_d + by_c @ dc[:, None]
-        if not by_ends:  # δk is not needed, since `unknowns` computes k
-            return Change(turn, np.zeros_like(turn), dc)
-        dk = R.mT @ (hat(c)[:, None] @ turn + dc[:, None])
-        return Change(turn, dk, dc)
+        return turns[..., :-3] + d, turns[..., -3:]
+
+
+def turned_rate(now: Unknowns, turn: Array, dc: Array) -> Array:
+    """Return the changes of w'' = Rᵀc by the turns ε of the nodes, and by δc."""
+    return now.R.mT @ (hat(now.c)[:, None] @ turn + dc[:, None])
 
 
 def _coarse_causes(R: Array, c: Array, d: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Optima as curves: the class `Optimum`, and its curves on SO(3) and SE(3)."""
+"""Optima as curves: the class `Optimum`, its curves on SO(3) and SE(3), and chains of them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._checks import as_time
 from rbcourse._numerics import Array
 from rbcourse.body import Body
+from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve, weighted_sums
 from rbcourse.curves.functionals import Functional
 from rbcourse.curves.rigid import RigidMotion
-from rbcourse.optimum._collocation import Failure, Solution, orthogonal
+from rbcourse.optimum._collocation import EXACT, Failure, Solution, orthogonal
 from rbcourse.optimum._second_variation import is_positive
 
 _FOUND = [
@@ -173,6 +174,83 @@ class OptimalMotion(RigidMotion, Optimum):
         start, end = v0 - (x1 - x0), v1 - (x1 - x0)
         squares: Array = np.sum(start**2 + start * end + end**2, axis=-1)
         return 4 * squares / self.duration**3
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class OptimalChain(Chain):
+    """A `Chain` of optimal legs that is optimal, or at least stationary, as a whole.
+
+    Attributes
+    ----------
+    cost, certified : float, bool
+        As for `Optimum`; all nearby curves through the same poses cost more than a certified chain.
+    definite : bool
+        Whether the second derivative of the cost with respect to the values at the poses is
+        positive definite. This is False if a family of curves has the same cost, for example if a
+        body is symmetric about the axis of all rotations.
+    c : ndarray, shape (N − 1, 3)
+        The constant R p of each leg in the fixed frame.
+    residual, iterations, converged : float, int, bool
+        The largest residual of the legs, the number of steps of Newton's method, and True, since a
+        failure raises ConvergenceError.
+    """
+
+    legs: Optimum
+    velocities: Array
+    cost: float
+    definite: bool
+    residual: float
+    iterations: int
+    converged: bool = True
+
+    @property
+    def optimum(self) -> OptimalRotation:
+        """The rotations of the legs."""
+        return self.legs.found
+
+    @property
+    def c(self) -> Array:
+        """The constant R p of each leg."""
+        return self.optimum.c
+
+    @property
+    def certified(self) -> bool:
+        """Whether the chain is proven to be a strict local minimum."""
+        return bool(self.definite and self.optimum.positive.all())
+
+    def lasting(self, duration: Array) -> Self:
+        """Return the chain with another duration and the same start time."""
+        share = float(duration / self.duration) ** (self.optimum.functional.ends + 1)
+        return replace(super().lasting(duration), cost=self.cost / share)
+
+    def _moved(self, L: Array, X: Array) -> Chain:
+        parts = {name: getattr(self, name) for name in ("duration", "times", "legs", "velocities")}
+        return Chain(**parts, body=self.body)._moved(L, X)
+
+    def _what(self) -> str:
+        return f"Optimum of {self.optimum.functional.name} through {len(self.times)} poses"
+
+    def _result(self) -> str:
+        proof = "a proven local minimum" if self.certified else "not proven to be a minimum"
+        return f", cost {self.cost:.6g}, {proof}"
+
+
+class ConvergenceError(RuntimeError):
+    """The error raised if no curve is found; it gives the `residual` after `iterations` steps."""
+
+    def __init__(self, residual: float, iterations: int, reason: str = "") -> None:
+        if not reason:
+            reason = "the end velocities may be too large, or the principal moments too different"
+        if residual < EXACT:
+            reason = "only a saddle was found"
+        what = f"no convergence: residual {residual:.1e} after {iterations} iterations"
+        super().__init__(f"{what}; {reason}")
+        self.residual = residual
+        self.iterations = iterations
+        self.reason = reason
+
+    def __reduce__(self) -> tuple[type, tuple[float, int, str]]:
+        return type(self), (self.residual, self.iterations, self.reason)  # for pickle
 
 
 def optimum_of(

@@ -227,16 +227,16 @@ def _newton(problem: Problem, R: Array) -> Found | Failure:
         legs = _on_enough_nodes(problem, values, unknowns, turned)
         if not legs.resolved(turned):
             return Failure(legs.left, step)
-        responses = _responses(legs)
+        responses = responses_of(legs)
         system = _system(problem, legs, responses)
-        _, change = _minimum(system, problem.ends)
+        _, change = minimum(system, problem.ends)
         if max(legs.left, legs.tail) < EXACT and turned < SHORT:
             solutions = legs.solutions(step)
             cost = problem.total([one.cost for one in solutions])
             if not _lowers(change, system, values, cost):
-                shift, _ = _minimum(system, problem.ends, (-FLAT, FLAT, *SHIFTS[1:]))
+                shift, _ = minimum(system, problem.ends, (-FLAT, FLAT, *SHIFTS[1:]))
                 return Found(legs.unknowns.R, values, solutions, cost, shift)
-        of_legs = _combined(responses, problem.own(change))
+        of_legs = combined(responses, problem.own(change).reshape(len(problem.h), -1))
         turned = float(np.linalg.norm(of_legs.turn, axis=-1).max())
         share = LONGEST_STEP / max(LONGEST_STEP, turned)
         unknowns = legs.stepped(of_legs, share)
@@ -259,7 +259,7 @@ def _on_enough_nodes(problem: Problem, values: Array, unknowns: Unknowns, turned
     return legs
 
 
-def _responses(legs: Legs) -> Change:
+def responses_of(legs: Legs) -> Change:
     """Return a Newton step of each leg, and its responses to unit changes of its end values."""
     made = []
     for some in blocks(len(legs.unknowns.R), TOGETHER):
@@ -270,11 +270,9 @@ def _responses(legs: Legs) -> Change:
     return joined(made)
 
 
-def _combined(responses: Change, ends: Array) -> Change:
-    """Return a Newton step plus the responses to changes of the end values."""
-    count = len(ends)
-    one = np.ones((count, 1))
-    x = np.append(one, ends.reshape(count, -1), axis=1)
+def combined(responses: Change, ends: Array) -> Change:
+    """Return a Newton step plus the responses to changes of the end values, shape (N, …)."""
+    x = np.insert(ends, 0, 1, axis=1)
     return Change(*(np.einsum("i...j,ij->i...", y, x) for y in responses))
 
 
@@ -282,7 +280,7 @@ def _system(problem: Problem, legs: Legs, responses: Change) -> KnotSystem:
     """Return the second derivative of the cost, and minus its gradient after a step of each leg."""
     scale = problem.scale
     size = scale.shape[1]
-    momenta, changes = _momenta(problem.functional, legs, responses)
+    momenta, changes = end_momenta(problem.functional, legs, responses)
     momenta = momenta + changes[..., 0]
     by_order = changes[..., 1:].reshape(-1, size, size // 6, 2, 3)  # as in `Problem.own`
     by_end = by_order.swapaxes(2, 3).reshape(-1, size, size)
@@ -290,10 +288,10 @@ def _system(problem: Problem, legs: Legs, responses: Change) -> KnotSystem:
     factors = signs * problem.weight[:, None] * scale
     H = factors[..., None] * by_end * scale[:, None]
     b = -factors * momenta.reshape(-1, size)
-    return _knot_system((H + H.mT) / 2, b)
+    return knot_system((H + H.mT) / 2, b)
 
 
-def _momenta(functional: Functional, legs: Legs, responses: Change) -> tuple[Array, Array]:
+def end_momenta(functional: Functional, legs: Legs, responses: Change) -> tuple[Array, Array]:
     """Return the momenta at both ends of the legs, and their changes for each response."""
     m = functional.ends
     k = legs.unknowns.k
@@ -301,21 +299,22 @@ def _momenta(functional: Functional, legs: Legs, responses: Change) -> tuple[Arr
     rates = rates_at_nodes(legs.equations.ends, k)[:m]
     at_ends = [x[:, [0, -1]] for x in rates]
     momenta, slopes = functional.momenta(*at_ends)
-    changes = np.zeros((*momenta.shape, 1 + 3 * m))
+    changes = np.zeros((*momenta.shape, responses.k.shape[-1]))
+    by_ends = slice(1, 1 + 3 * m)
     for from_ends, from_k, slope in zip(by.from_ends, by.from_k, slopes, strict=False):
         changes += slope @ along(from_k[[0, -1]], responses.k)
-        changes[..., 1:] += by_ends_of(from_ends[[0, -1]], slope)
+        changes[..., by_ends] += by_ends_of(from_ends[[0, -1]], slope)
     return momenta, changes
 
 
-def _knot_system(H: Array, b: Array) -> KnotSystem:
+def knot_system(H: Array, b: Array) -> KnotSystem:
     """Return the system of matrices and loads of the legs; the values at the start come first."""
     m = b.shape[1] // 2
     A, B, D = H[:, :m, :m], H[:, :m, m:], H[:, m:, m:]
     return KnotSystem(A, B, D, b0=b[:, :m], b1=b[:, m:])
 
 
-def _minimum(
+def minimum(
     system: KnotSystem, ends: Conditions, shifts: Sequence[float] = SHIFTS
 ) -> tuple[float, Array]:
     """Return the first shift of a system for which it is positive definite, and its solution.
@@ -378,7 +377,7 @@ def _best_change(problem: Problem, R: Array, shapes: list[Array]) -> Array:
     E = weight * (rest.mT @ rest)
     H = h[..., None] ** 2 * E[:, :6, :6]
     b = -h * E[:, :6, 6]
-    _, change = _minimum(_knot_system(H, b), problem.ends)
+    _, change = minimum(knot_system(H, b), problem.ends)
     slopes = h * np.append(change[:-1], change[1:], axis=1)
     of_bumps = -matvec(by_cubics[..., :6], slopes) - by_cubics[..., 6]
     coefficients = np.append(slopes, of_bumps, axis=1)

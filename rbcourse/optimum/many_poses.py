@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +12,6 @@ from rbcourse._checks import as_single
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
 from rbcourse.body import Body
-from rbcourse.curves.chain import Chain
 from rbcourse.curves.closed import normalised_cubic
 from rbcourse.curves.ends import Ends, as_body
 from rbcourse.curves.functionals import BallAcceleration, Effort, Functional, Jerk
@@ -27,9 +25,8 @@ from rbcourse.curves.velocities import (
     spline_velocities,
 )
 from rbcourse.optimum._collocation import NODES, Failure, on_nodes
-from rbcourse.optimum._result import OptimalMotion, OptimalRotation, Optimum, optimum_of
+from rbcourse.optimum._result import ConvergenceError, OptimalChain, OptimalMotion, optimum_of
 from rbcourse.optimum._spline import Found, Problem, solve_spline
-from rbcourse.optimum.two_poses import ConvergenceError
 from rbcourse.projection import nearest
 
 
@@ -179,65 +176,6 @@ def minimum_jerk_spline(
     """
     times, rotations = _rotations(times, poses)
     return _spline(times, rotations, as_ends(ends, len(rotations), 6), Body.ball(), "jerk", long)
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class OptimalChain(Chain):
-    """A `Chain` of optimal legs that is optimal, or at least stationary, as a whole.
-
-    Attributes
-    ----------
-    cost, certified : float, bool
-        As for `Optimum`; all nearby curves through the same poses cost more than a certified chain.
-    definite : bool
-        Whether the second derivative of the cost with respect to the values at the poses is
-        positive definite. This is False if a family of curves has the same cost, for example if a
-        body is symmetric about the axis of all rotations.
-    c : ndarray, shape (N − 1, 3)
-        The constant R p of each leg in the fixed frame.
-    residual, iterations, converged : float, int, bool
-        The largest residual of the legs, the number of steps of Newton's method, and True, since a
-        failure raises ConvergenceError.
-    """
-
-    legs: Optimum
-    velocities: Array
-    cost: float
-    definite: bool
-    residual: float
-    iterations: int
-    converged: bool = True
-
-    @property
-    def optimum(self) -> OptimalRotation:
-        """The rotations of the legs."""
-        return self.legs.found
-
-    @property
-    def c(self) -> Array:
-        """The constant R p of each leg."""
-        return self.optimum.c
-
-    @property
-    def certified(self) -> bool:
-        """Whether the chain is proven to be a strict local minimum."""
-        return bool(self.definite and self.optimum.positive.all())
-
-    def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration and the same start time."""
-        share = float(duration / self.duration) ** (self.optimum.functional.ends + 1)
-        return replace(super().lasting(duration), cost=self.cost / share)
-
-    def _moved(self, L: Array, X: Array) -> Chain:
-        parts = {name: getattr(self, name) for name in ("duration", "times", "legs", "velocities")}
-        return Chain(**parts, body=self.body)._moved(L, X)
-
-    def _what(self) -> str:
-        return f"Optimum of {self.optimum.functional.name} through {len(self.times)} poses"
-
-    def _result(self) -> str:
-        proof = "a proven local minimum" if self.certified else "not proven to be a minimum"
-        return f", cost {self.cost:.6g}, {proof}"
 
 
 def _rotations(times: ArrayLike, poses: ArrayLike) -> tuple[Array, Array]:

@@ -13,8 +13,14 @@ from rbcourse._numerics import Array
 from rbcourse.body import Body
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.ends import Ends, Given, Rate, as_body, between, on_rotations
-from rbcourse.optimum._collocation import EXACT, Failure, relax
-from rbcourse.optimum._result import OptimalMotion, OptimalRotation, Optimum, optimum_of
+from rbcourse.optimum._collocation import Failure, relax
+from rbcourse.optimum._result import (
+    ConvergenceError,
+    OptimalMotion,
+    OptimalRotation,
+    Optimum,
+    optimum_of,
+)
 from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, jerk
 from rbcourse.optimum._search import body as of_body
 
@@ -241,22 +247,6 @@ def stationary(guess: Curve) -> Optimum:
         found = relax(task.equations, R)
         functional, ends = task.equations.functional, task.equations.ends
         return optimum_of(functional, ends, found, guess.duration, Body.ball())
-
-
-class ConvergenceError(RuntimeError):
-    """The error raised if no curve is found; it gives the `residual` after `iterations` steps."""
-
-    def __init__(self, residual: float, iterations: int) -> None:
-        reason = "the end velocities may be too large, or the principal moments too different"
-        if residual < EXACT:
-            reason = "only a saddle was found"
-        what = f"no convergence: residual {residual:.1e} after {iterations} iterations"
-        super().__init__(f"{what}; {reason}")
-        self.residual = residual
-        self.iterations = iterations
-
-    def __reduce__(self) -> tuple[type, tuple[float, int]]:
-        return type(self), (self.residual, self.iterations)  # so that pickle restores both
 
 
 def _solved(task: Task, given: Given) -> Optimum:
