@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from rbcourse._chebyshev import grid
+from rbcourse._polynomials import grid
 from rbcourse.optimum._second_variation import polynomials
 
 NODES = 33

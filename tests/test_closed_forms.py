@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
 from rbcourse import _quaternions as jets
-from rbcourse._hermite import hermite
+from rbcourse._polynomials import hermite
 
 EPS = np.finfo(float).eps
 MAKERS = {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rbcourse as rb
-from rbcourse._chebyshev import grid
+from rbcourse._polynomials import grid
 from rbcourse.curves.functionals import BallAcceleration, Effort
 from rbcourse.optimum import _collocation as collocation
 

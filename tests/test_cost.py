@@ -10,7 +10,7 @@ from optima import OPTIMA, deviation
 from scipy.integrate import quad
 
 import rbcourse as rb
-from rbcourse._hermite import hermite
+from rbcourse._polynomials import hermite
 from rbcourse.straight_line import theta
 
 I3, I4, REST = np.eye(3), np.eye(4), np.zeros(3)

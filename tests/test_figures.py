@@ -38,8 +38,8 @@ def test_every_figure_has_complete_files(name):
     if name in TABLES:
         assert files == {".csv"}
         return
-    # lesson 16 tells how to include its figure in an article
-    pdf = {".pdf"} if name.startswith(("paper_", "report_", "lesson16_paper")) else set()
+    # lesson 17 tells how to include its figure in an article
+    pdf = {".pdf"} if name.startswith(("paper_", "report_", "lesson17_paper")) else set()
     assert files - {".gif"} == {".png", ".csv"} | pdf
     if pdf:
         content = (FIGURES / f"{name}.pdf").read_bytes()

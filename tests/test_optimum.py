@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
 import rbcourse as rb
-from rbcourse._chebyshev import grid, interpolation
+from rbcourse._polynomials import grid, interpolation
 from rbcourse.optimum._search import Search
 
 every_optimum = pytest.mark.parametrize("what", OPTIMA)

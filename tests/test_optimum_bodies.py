@@ -10,8 +10,7 @@ from optima import BOOK, COSTS, I3, OPTIMA, REST, bodies, deviation, random_prob
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse._chebyshev import grid
-from rbcourse._hermite import hermite
+from rbcourse._polynomials import grid, hermite
 from rbcourse.curves.ends import Ends
 from rbcourse.optimum._collocation import relax
 from rbcourse.optimum._search import ball

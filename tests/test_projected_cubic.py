@@ -9,7 +9,7 @@ from numpy.polynomial import Polynomial
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse._hermite import hermite
+from rbcourse._polynomials import hermite
 from rbcourse.curves.ends import Ends
 from rbcourse.curves.projected import (
     _may_almost_jump,

@@ -181,7 +181,7 @@ def test_lab_opens_the_first_lesson_without_the_extensions_for_teachers(
 
 
 def test_the_last_lesson_agrees_with_the_citation_file():
-    shown = re.sub(r"[{}]", "", read("notebooks/16_take_it_away.ipynb"))
+    shown = re.sub(r"[{}]", "", read("notebooks/17_take_it_away.ipynb"))
     both, _ = read("CITATION.cff").split("- type: report")
     said = dict(re.findall(r"^\W*([a-z-]+): (.*)$", both, re.MULTILINE))
     for name in ("version", "family-names", "given-names", "volume", "issue", "start", "year"):

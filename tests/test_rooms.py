@@ -30,6 +30,7 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     "rbclassroom.explorers": {"rbcourse", "rbcourse.draw"}
     | {"rbclassroom.course", "rbclassroom.figures"},
     "rbclassroom.atlas": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
+    "rbclassroom.rivals": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
     "rbclassroom.course": {"rbcourse", "rbclassroom"},
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbcourse", "rbcourse.draw"}
@@ -51,6 +52,7 @@ LIBRARIES = {
     | {"pooch"},
     "rbclassroom.figures": {"matplotlib"},
     "rbclassroom.atlas": {"threadpoolctl"},
+    "rbclassroom.rivals": set(),
     "rbclassroom.course": {"PIL", "jupyterlab", "nbclient", "nbformat", "tornado"},
     "rbclassroom.lecture": {"PIL", "markdown_it", "mdit_py_plugins", "nbformat"}
     | {"segno", "tornado"},

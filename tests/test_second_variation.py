@@ -4,7 +4,7 @@ import pytest
 
 import rbcourse as rb
 from rbclassroom.atlas import random_problems
-from rbcourse._chebyshev import grid
+from rbcourse._polynomials import grid
 from rbcourse.curves.ends import Ends
 from rbcourse.optimum._collocation import relax
 from rbcourse.optimum._result import optimum_of

@@ -64,7 +64,7 @@ def taken(function, size):
     arguments = ARGUMENTS | of_group
     names = [x.name for x in parameters.values() if x.default is x.empty or x.name in of_group]
     given = {name: arguments[name] for name in names if name in arguments}
-    if function is rb.smoothing_spline:
+    if "smoothing" in function.__name__:  # three or more poses
         poses = np.concatenate([given["poses"], given["poses"][:1]])
         given = {"times": np.arange(len(poses)), "poses": poses}
     if function is rb.sampling.uniformity_tests:

@@ -9,10 +9,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._chebyshev import grid
 from rbcourse._checks import as_single, check_broadcast
 from rbcourse._docs import described_by
 from rbcourse._numerics import EPS, Array, blocks
+from rbcourse._polynomials import grid
 from rbcourse.body import Body, of_point
 from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve, SingularTime, which_curve

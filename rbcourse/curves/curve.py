@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_array, as_duration, as_time, check_broadcast, check_order
 from rbcourse._docs import described_by
-from rbcourse._hermite import hermite
 from rbcourse._numerics import BLOCK, Array, blocks, cross
+from rbcourse._polynomials import hermite
 from rbcourse._quaternions import Jet, angular_velocity, multiply, rotation
 from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import Body, of_point

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._docs import described_by
 from rbcourse._foam import GAP_ERROR, gaps
-from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import BLOCK, Array, blocks, cross
+from rbcourse._polynomials import hermite, hermite_stack, stack_terms
 from rbcourse.body import Body, weight_of
 from rbcourse.curves.curve import Curve, SingularTime, check_defined, least_over_time, near_margins
 from rbcourse.curves.ends import Ends, Rate, between

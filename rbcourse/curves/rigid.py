@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_array, check_all
-from rbcourse._hermite import hermite, hermite_stack, stack_terms
 from rbcourse._numerics import Array, matvec
+from rbcourse._polynomials import hermite, hermite_stack, stack_terms
 from rbcourse.body import of_point
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.ends import Given

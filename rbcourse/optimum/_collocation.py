@@ -22,8 +22,8 @@ from typing import Any, NamedTuple, Self, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._chebyshev import along, grid, interpolation, primitives, tails
 from rbcourse._numerics import Array, blocks, scaled, solve
+from rbcourse._polynomials import along, grid, interpolation, primitives, tails
 from rbcourse.curves.functionals import Functional
 from rbcourse.so3 import hat, vee
 

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rbcourse._chebyshev import chebyshev, grid
-from rbcourse._hermite import hermite
 from rbcourse._numerics import Array, blocks, matvec
+from rbcourse._polynomials import chebyshev, grid, hermite
 from rbcourse.curves.ends import Ends
 from rbcourse.curves.functionals import Functional
 from rbcourse.optimum._collocation import TOGETHER, cayley, on_nodes, rates_of, with_derivatives

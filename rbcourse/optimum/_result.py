@@ -10,9 +10,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._checks import as_time
 from rbcourse._numerics import Array
+from rbcourse._polynomials import along, chebyshev, grid, primitives
 from rbcourse.body import Body
 from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve, weighted_sums

@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rbcourse._chebyshev import grid
 from rbcourse._numerics import EPS, Array
+from rbcourse._polynomials import grid
 from rbcourse.curves.bezier import corrected_bezier
 from rbcourse.curves.ends import Ends
 from rbcourse.curves.functionals import BallAcceleration, Effort, Jerk

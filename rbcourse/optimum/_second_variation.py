@@ -30,8 +30,8 @@ from typing import Any
 
 import numpy as np
 
-from rbcourse._chebyshev import Grid, grid
 from rbcourse._numerics import Array, matvec
+from rbcourse._polynomials import Grid, grid
 from rbcourse.so3 import hat
 
 _PENALTY = 1e4  # the penalty is this number times (‖c‖ + 1) ‖M‖

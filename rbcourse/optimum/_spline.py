@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._chebyshev import along, chebyshev, grid, primitives
 from rbcourse._numerics import Array, blocks, matvec, solve
+from rbcourse._polynomials import along, chebyshev, grid, primitives
 from rbcourse.curves.functionals import BallAcceleration, Effort, Functional
 from rbcourse.curves.velocities import Conditions, KnotSystem
 from rbcourse.optimum._collocation import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rbcourse._chebyshev import grid, tails
 from rbcourse._numerics import Array, blocks
+from rbcourse._polynomials import grid, tails
 from rbcourse.curves.cost import smooth_legs, summed
 from rbcourse.curves.curve import Curve
 from rbcourse.optimum._second_variation import on_each_axis, polynomials, products

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbcourse._chebyshev import grid
 from rbcourse._checks import as_single
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, matvec
+from rbcourse._polynomials import grid
 from rbcourse.body import Body
 from rbcourse.curves.closed import normalised_cubic
 from rbcourse.curves.ends import Ends, as_body

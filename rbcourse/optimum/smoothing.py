@@ -25,9 +25,9 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._chebyshev import grid
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, solve
+from rbcourse._polynomials import grid
 from rbcourse.body import Body
 from rbcourse.curves.functionals import BallAcceleration
 from rbcourse.curves.smoothing import (
@@ -173,30 +173,35 @@ class _Tried(NamedTuple):
 
 
 def _best(problem: _Problem, first: _Tried, noise: float | None) -> tuple[_State, float]:
-    """Return the smoothing of least score near a first one, and a nearby curve.
+    """Return the logarithm of the smoothing with the least score, and the curve of a nearby one.
 
-    The smoothing changes in steps, down the slope of the score. A parabola refines the least one.
+    From a first smoothing, steps go down the slope of the score; then the least is bracketed.
     """
-    tried = [first]
+    from scipy.optimize import minimize_scalar
+
+    def tried(log: float, near: _State) -> _Tried:
+        try:
+            state, _ = problem.solved(near, log)
+        except ConvergenceError:
+            return _Tried(np.inf, log, near)
+        return _Tried(problem.score(state, log, noise), log, state)
+
+    best = first
     for way in (1, -1):
-        tried = tried[::-1]
-        while True:
-            last, least = tried[-1], int(np.argmin([one.score for one in tried]))
-            log = last.log + way * STEP
-            enough = len(tried) - 1 - least >= BEYOND and (way < 0 or last.log > 0)
-            if enough or not LEAST <= log <= MOST:
+        last, worse = first, 0
+        # for steps above the noise, the score of short periods has other minima
+        while last.score < np.inf and (worse < BEYOND or way > 0 > last.log):
+            if not LEAST <= last.log + way * STEP <= MOST:
                 break
-            try:
-                state, _ = problem.solved(last.state, log)
-            except ConvergenceError:
-                break
-            tried.append(_Tried(problem.score(state, log, noise), log, state))
-    least = int(np.argmin([one.score for one in tried]))
-    best, log = tried[least], tried[least].log
-    if 0 < least < len(tried) - 1:
-        more, mid, less = (one.score for one in tried[least - 1 : least + 2])
-        log += STEP * (less - more) / (2 * (less - 2 * mid + more))
-    return best.state, log
+            last = tried(last.log + way * STEP, last.state)
+            best, worse = (last, 0) if last.score < best.score else (best, worse + 1)
+    found = minimize_scalar(
+        lambda log: tried(log, best.state).score,
+        bounds=(best.log - STEP, best.log + STEP),
+        method="bounded",
+        options={"xatol": 0.05},
+    )
+    return best.state, float(found.x)
 
 
 class _State(NamedTuple):

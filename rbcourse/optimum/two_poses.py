@@ -7,9 +7,9 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._chebyshev import grid
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array
+from rbcourse._polynomials import grid
 from rbcourse.body import Body
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.ends import Ends, Given, Rate, as_body, between, on_rotations

@@ -48,6 +48,16 @@ _TO_SOLVE = """
 tells you what is wrong. At the end, download `{name}.ipynb`, the file to hand in. Until then this \
 browser keeps your answers. If you prefer Jupyter, ask your teacher for the set as a zip file.
 """
+_MOVED = """<!DOCTYPE html>
+<html lang="en">
+<meta charset="utf-8">
+<title>A new address</title>
+<link rel="canonical" href="{new}">
+<noscript><meta http-equiv="refresh" content="0; url={new}"></noscript>
+<script>location.replace("{new}" + location.hash)</script>
+<p>This page is now at <a href="{new}">{new}</a>.</p>
+</html>
+"""
 LIVE = "_static/live"
 """The folder of the book with the files for running Python in its pages."""
 MADE = "made-by-course.txt"
@@ -214,6 +224,11 @@ class Sources:
         packed = pack({f"rbcourse/{name}": content for name, content in files.items()})
         (self.extra / "course.zip").write_bytes(packed)
 
+    def put_moved(self) -> None:
+        """Write a page at each old address that leads to the new one, with the same heading."""
+        for old, new in CONTENTS["moved"].items():
+            write(self.extra / old, _MOVED.format(new=new))
+
     def put_fronts(self) -> None:
         """Write the pages that have a template: the start page, the lists and the instructions."""
         cube = recorded.living("cube").replace("<figure>", '<figure class="hero">', 1)
@@ -240,6 +255,7 @@ def write_sources(
     sources.put_package()
     sources.put_files()
     sources.put_course()
+    sources.put_moved()
     sources.put_fronts()
 
 

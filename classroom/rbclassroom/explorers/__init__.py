@@ -8,7 +8,8 @@
 | 04 | `projection` | | 13 | `body` |
 | 05 | `random` | | 14 | `spline` |
 | 06 | `theta` | | 15 | `timing` |
-| 07 | `screw` | | 16 | `chain` |
+| 07 | `screw` | | 16 | `smoothing` |
+| | | | 17 | `chain` |
 """
 
 from rbclassroom.explorers.bodies import body_explorer
@@ -17,6 +18,7 @@ from rbclassroom.explorers.optima import cube_explorer, minimum_acceleration_exp
 from rbclassroom.explorers.paths import chain_explorer, spline_explorer
 from rbclassroom.explorers.plane import arm_explorer, planar_explorer
 from rbclassroom.explorers.rotations import projection_explorer, random_explorer, rotation_explorer
+from rbclassroom.explorers.smoothing import smoothing_explorer
 from rbclassroom.explorers.timing import timing_explorer
 
 __all__ = [
@@ -31,6 +33,7 @@ __all__ = [
     "random_explorer",
     "rotation_explorer",
     "screw_explorer",
+    "smoothing_explorer",
     "spline_explorer",
     "theta_explorer",
     "timing_explorer",

@@ -1,5 +1,6 @@
 """The controls of explorers. If a control has a unit, its label ends with the unit."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import ipywidgets
@@ -20,7 +21,12 @@ def slider(label: str, value: float, low: float, high: float, step: float) -> An
 def stepped(label: str, value: float, low: float, high: float, step: float) -> Any:
     """Return a slider that can play; its values are `step` apart."""
     values = np.round(np.arange(low, high + step / 2, step), _digits(step)) + 0.0
-    options = [(numbers(x, _digits(step)), x) for x in values.tolist()]
+    return listed(label, value, values.tolist(), _digits(step))
+
+
+def listed(label: str, value: float, values: Sequence[float], decimals: int) -> Any:
+    """Return a slider that can play, with the given values."""
+    options = [(numbers(x, decimals), x) for x in values]
     return ipywidgets.SelectionSlider(options=options, value=value, description=label, **_LOOK)
 
 

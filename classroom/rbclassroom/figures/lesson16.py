@@ -1,0 +1,100 @@
+"""Lesson 16: a noisy recording of a hand, and curves near it."""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+
+import rbcourse as rb
+from rbclassroom.figures import name_lines, named
+from rbcourse import Array, Curve
+from rbcourse.draw.save import COLOURS, PALE, Table
+
+MARKS = np.array([[0.0, 0, 0], [70, 35, -20], [140, -20, 40], [200, 30, 10], [170, 60, -30]])
+"""Yaw, pitch and roll at 0, 1, 2, 3 and 4 s, in degrees."""
+_LOOKS: dict[str, dict[str, Any]] = {
+    "through all poses": {"color": COLOURS["z"], "lw": 1},
+    "the hand": {"color": COLOURS["optimum"], "lw": 4, "alpha": 0.35},
+    "smoothed": {"color": COLOURS["projection"], "lw": 2},
+    "rotation vectors": {"color": COLOURS["x"], "ls": "--"},
+}
+_ERRORS: dict[str, dict[str, Any]] = {
+    "from the measured poses": {"color": COLOURS["z"], "ls": "-."},
+    "from an omitted pose": {"color": COLOURS["projection"], "lw": 2.5},
+    "from the hand": {"color": COLOURS["optimum"], "ls": "--"},
+}
+
+
+def hand() -> Curve:
+    """Return the motion of the hand: least jerk through the `MARKS`, at rest at both ends."""
+    R = rb.matrix_from_zyx(np.radians(MARKS))
+    return rb.minimum_jerk_spline(np.arange(len(R)), R, "rest")
+
+
+def speeds(curves: dict[str, Curve], order: Literal[1, 2], samples: int = 1601) -> Table:
+    """Return the norms of w (order 1) or w' (order 2) of curves on SO(3) over time."""
+    t = np.linspace(*next(iter(curves.values())).domain, samples)
+    unit = " [rad/s]" if order == 1 else " [rad/s²]"
+    found = {name + unit: np.linalg.norm(c(t, order), axis=1) for name, c in curves.items()}
+    return {"t [s]": t, **found}
+
+
+def draw_speeds(ax: Axes, data: Table, places: dict[str, tuple[float, float]]) -> None:
+    """Draw a table of `speeds`, with the names of the curves at the given places."""
+    unit = "rad/s²" if "²" in [*data][-1] else "rad/s"
+    t, curves = np.asarray(data["t [s]"]), named(f" [{unit}]", data)
+    for name, values in curves.items():
+        ax.plot(t, values, label=name, **_LOOKS[name])
+    letter = r"\omega'" if unit == "rad/s²" else r"\omega"
+    ax.set(xlabel="time (s)", ylabel=rf"$\Vert {letter}\Vert$ ({unit})", xlim=(t[0], t[-1]))
+    ax.set(ylim=(0, 1.05 * max(x.max() for x in curves.values())))
+    name_lines(ax, places)
+
+
+def distance(a: Array, b: Array) -> float:
+    """Return the root mean square of the angles between rotations, in degrees."""
+    angles = rb.angle_between(a, b)
+    return float(np.degrees(np.sqrt(np.mean(angles**2))))
+
+
+def validation_table(
+    truth: Curve, t: Array, measured: Array, periods: Sequence[float] | Array
+) -> Table:
+    """Return root mean squares of the distances of smoothed curves, for each period, in rad.
+
+    The curve without one pose misses this pose by about its distance with the pose, divided by the
+    share of the degrees of freedom that the residuals have.
+    """
+    rows = []
+    for period in periods:
+        c = rb.smoothing_spline(t, measured, period=float(period))
+        near = distance(c(t), measured)
+        misfit = np.sum((c(t) - measured) ** 2) / 2
+        share = misfit / (3 * c.noise**2) / len(t)
+        rows.append(np.radians([near, near / share, distance(c(t), truth(t))]))
+    names = (f"{name} [rad]" for name in _ERRORS)
+    return {"period [s]": np.asarray(periods), **dict(zip(names, np.transpose(rows), strict=True))}
+
+
+def draw_validation(ax: Axes, data: Table, best: float) -> None:
+    """Draw a `validation_table` in degrees, with a line at the best period."""
+    periods, errors = np.asarray(data["period [s]"]), named(" [rad]", data)
+    for name, values in errors.items():
+        ax.plot(periods, np.degrees(values), label=name, **_ERRORS[name])
+    ax.axvline(best, color=PALE, lw=1, ls=":")
+    ax.set(xscale="log", yscale="log", xlabel="period (s)", ylabel="distance (°)")
+    ax.set(xlim=(periods[0], periods[-1]), ylim=(0.1, 20))
+    ax.set_xticks([0.03, 0.1, 0.3, 1], ["0.03", "0.1", "0.3", "1"])
+    ax.set_yticks([0.1, 1, 10], ["0.1", "1", "10"])
+
+
+def draw_distances(ax: Axes, data: Table) -> None:
+    """Draw distances from the hand, given in rad, in degrees over time."""
+    t = np.asarray(data["t [s]"])
+    for name, values in named(" [rad]", data).items():
+        ax.plot(t, np.degrees(values), label=name, **_LOOKS[name])
+    ax.set(yscale="log", ylim=(0.01, 200), xlim=(t[0], t[-1]))
+    ax.set_yticks([0.01, 0.1, 1, 10, 100], ["0.01", "0.1", "1", "10", "100"])
+    ax.set(xlabel="time (s)", ylabel="distance from the hand (°)")
+    ax.legend(loc="upper left")
