@@ -9,7 +9,17 @@ from rbclassroom.course.ledger import KEY, MISPRINTS, WHAT
 
 CONTENTS = tomllib.loads(Path(__file__).with_name("contents.toml").read_text("utf-8"))
 PAGES: dict[str, str] = CONTENTS["pages"]
-CLASSROOM = "explorers", "figures", "atlas", "rivals", "course", "lecture", "assignments", "live", "book"
+CLASSROOM = [
+    "explorers",
+    "figures",
+    "atlas",
+    "rivals",
+    "course",
+    "lecture",
+    "assignments",
+    "live",
+    "book",
+]
 """The parts of `rbclassroom`; all other modules are in `rbcourse`."""
 
 _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")

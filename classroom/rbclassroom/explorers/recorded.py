@@ -40,7 +40,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
     "rotation": ({"alpha": range(-160, 141, 60), "gamma": range(-160, 141, 60)}, 5),
     "screw": ({"tilt": range(0, 91, 15)}, 2),
-    "smoothing": ({"noise": [0.2, 1, 2, 5]}, 1),
+    "smoothing": ({"noise": [0.2, 1, 2, 5]}, 3),
     "spline": ({"pitch": [-60, -40, -20, 20, 60], "third": [2, 2.5, 3]}, 2),
     "theta": ({"angle": range(10, 171, 10)}, 1),
     "timing": ({"angular_speed": [0.5, 1, 2], "acceleration": [0.5, 1, 2, 4, 6]}, 4),

@@ -14,7 +14,7 @@ from rbcourse.draw.save import COLOURS, PALE
 from rbcourse.draw.spheres import draw_sphere
 
 TIMES, SEED = np.linspace(0, 4, 201), 16
-PERIODS = np.round(np.geomspace(0.06, 3, 18), 2)
+PERIODS = np.round(np.geomspace(0.06, 3, 61), 3)
 """The periods of the slider, in s."""
 _FASTEST, _LEAST, _MOST = 6.0, 0.05, 50.0
 _BETWEEN = np.linspace(0, 4, 401)
@@ -77,7 +77,7 @@ def smoothing_explorer() -> Explorer:
         }
     controls = {
         "noise": widgets.slider("noise, RMS (°)", 1.0, 0.2, 5.0, 0.2),
-        "period": widgets.listed("period (s)", 0.06, PERIODS.tolist(), 2),
+        "period": widgets.listed("period (s)", 0.06, PERIODS.tolist(), 3),
     }
 
     @lru_cache(maxsize=64)

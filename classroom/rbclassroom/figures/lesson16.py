@@ -40,8 +40,8 @@ def speeds(curves: dict[str, Curve], order: Literal[1, 2], samples: int = 1601) 
     return {"t [s]": t, **found}
 
 
-def draw_speeds(ax: Axes, data: Table, places: dict[str, tuple[float, float]]) -> None:
-    """Draw a table of `speeds`, with the names of the curves at the given places."""
+def draw_speeds(ax: Axes, data: Table) -> None:
+    """Draw a table of `speeds`."""
     unit = "rad/s²" if "²" in [*data][-1] else "rad/s"
     t, curves = np.asarray(data["t [s]"]), named(f" [{unit}]", data)
     for name, values in curves.items():
@@ -49,7 +49,7 @@ def draw_speeds(ax: Axes, data: Table, places: dict[str, tuple[float, float]]) -
     letter = r"\omega'" if unit == "rad/s²" else r"\omega"
     ax.set(xlabel="time (s)", ylabel=rf"$\Vert {letter}\Vert$ ({unit})", xlim=(t[0], t[-1]))
     ax.set(ylim=(0, 1.05 * max(x.max() for x in curves.values())))
-    name_lines(ax, places)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
 
 
 def distance(a: Array, b: Array) -> float:
@@ -87,6 +87,8 @@ def draw_validation(ax: Axes, data: Table, best: float) -> None:
     ax.set(xlim=(periods[0], periods[-1]), ylim=(0.1, 20))
     ax.set_xticks([0.03, 0.1, 0.3, 1], ["0.03", "0.1", "0.3", "1"])
     ax.set_yticks([0.1, 1, 10], ["0.1", "1", "10"])
+    name_lines(ax, {"from the measured poses": (0.2, 0.6), "from the hand": (0.12, 0.22)})
+    name_lines(ax, {"from an omitted pose": (0.06, 2)})
 
 
 def draw_distances(ax: Axes, data: Table) -> None:
@@ -97,4 +99,4 @@ def draw_distances(ax: Axes, data: Table) -> None:
     ax.set(yscale="log", ylim=(0.01, 200), xlim=(t[0], t[-1]))
     ax.set_yticks([0.01, 0.1, 1, 10, 100], ["0.01", "0.1", "1", "10", "100"])
     ax.set(xlabel="time (s)", ylabel="distance from the hand (°)")
-    ax.legend(loc="upper left")
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)

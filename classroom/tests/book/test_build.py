@@ -47,6 +47,16 @@ def test_problem_sets_have_no_solutions(source):
         assert not LEFTOVER.search(text)
 
 
+def test_old_addresses_lead_to_new_pages(written):
+    for old, new in CONTENTS["moved"].items():
+        text = (written / "extra" / old).read_text("utf-8")
+        assert f'location.replace("{new}" + location.hash)' in text
+        page = (Path(old).parent / new).with_suffix("")
+        pages = (written / "sources" / page).parent.glob(f"{page.name}.*")
+        assert [*pages]
+        assert not [*(written / "sources").glob(f"{Path(old).with_suffix('')}.*")]
+
+
 def test_the_course_is_included_without_outputs(written, source):
     with ZipFile(written / "extra/course.zip") as archive:
         names = {name.removeprefix("rbcourse/") for name in archive.namelist()}

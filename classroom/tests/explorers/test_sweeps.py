@@ -1,5 +1,6 @@
 """The drawings and texts of explorers agree with the package at all settings of the sliders."""
 
+import warnings
 from functools import cache, partial
 
 import numpy as np
@@ -10,7 +11,10 @@ from sweeps import made, notice, points, read_off, reads, sweep, tell
 
 import rbcourse as rb
 from rbclassroom.explorers.paths import ANGLES, POSES, SHARES
+from rbclassroom.explorers.smoothing import PERIODS, recorded
+from rbclassroom.explorers.smoothing import TIMES as RECORDED
 from rbclassroom.figures import FORMS
+from rbclassroom.figures.lesson16 import hand as motion_of_the_hand
 
 TIMES = np.linspace(0, 1, 61)
 BOOK = np.array([0.20, 0.13, 0.03])
@@ -426,6 +430,37 @@ def test_the_timing_stays_below_the_limits_of_its_path():
         assert_box(artists["box"], pose[:3, :3], [0.45, 0.3, 0.15], pose[:3, 3], 1e-12, 1e-12)
         for key, value in (("fastest", c.domain[1]), ("one rate", 3 / rate)):
             assert reads(said[key], value)
+
+
+@pytest.mark.source("beyond BK 17")
+def test_the_smoothed_curve_and_its_errors_are_those_of_the_package():
+    truth, R1 = motion_of_the_hand(), recorded(1.0)
+    off_truth = rb.angle_between(R1, truth(RECORDED))
+    assert np.degrees(np.sqrt(np.mean(off_truth**2))) == pytest.approx(1, abs=0.1)
+    for v, said, artists in sweep("smoothing", noise=1.0, period=PERIODS[24]):
+        R = recorded(v["noise"])
+        with warnings.catch_warnings(action="ignore"):
+            c = rb.smoothing_spline(RECORDED, R, period=v["period"])
+            best = rb.smoothing_spline(RECORDED, R)
+        assert off(points(artists["measured"]), R[:, :, 0]) < 1e-15
+        t = np.linspace(0, 4, len(points(artists["curve"])))
+        assert off(points(artists["curve"]), c(t)[:, :, 0]) < 1e-12
+        speed = np.linalg.norm(c(t, 1), axis=1)
+        assert off(points(artists["speed"]), np.stack([t, speed], axis=1)) < 1e-12
+        far, near = (
+            np.degrees(np.sqrt(np.mean(rb.angle_between(c(RECORDED), x) ** 2)))
+            for x in (truth(RECORDED), R)
+        )
+        free = np.sum((c(RECORDED) - R) ** 2) / 2 / (3 * c.noise**2)
+        predicted = near * len(RECORDED) / free
+        for name, value in (("from the hand", far), ("omitted pose", predicted)):
+            assert off(points(artists[f"{name} now"]), [[v["period"], value]]) < 1e-9
+            line = points(artists[name])
+            here = np.abs(line[:, 0] - v["period"]).argmin()
+            assert line[here] == pytest.approx([v["period"], value])
+        wanted = predicted, far, best.period
+        for text, value in zip(said.values(), wanted, strict=True):
+            assert reads(text, value)
 
 
 def planned(v, t, frame):
