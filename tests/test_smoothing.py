@@ -1,8 +1,10 @@
 """Test smooth curves near noisy rotations and poses by their definitions and by SciPy."""
 
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -203,19 +205,23 @@ def test_the_fastest_motion_along_a_noisy_recording_takes_hardly_longer():
 
 
 def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
-    t = np.arange(100.0)
-    R, measured = wandering(t, 0.05, 0.02)
-    measured[[7, 40, 41, 80]] = Rotation.random(4, np.random.default_rng(7)).as_matrix()
-    w = np.ones(100)
+    """The first poses accelerate, where natural ends do not follow them."""
+    rng, t = np.random.default_rng(7), np.linspace(0, 10, 301)
+    vectors = np.stack([np.sin(t), 0.5 * t, np.cos(1.3 * t)], axis=-1)
+    true = rb.pose_from_components(rb.exp_so3(vectors), np.stack([np.cos(t), np.sin(t), t], -1))
+    poses = true.copy()
+    poses[:, :3, :3] @= rb.exp_so3(0.004 * rng.normal(size=(301, 3)))
+    poses[:, :3, 3] += 0.002 * rng.normal(size=(301, 3))
+    poses[[20, 120, 121, 240], :3, :3] = Rotation.random(4, rng).as_matrix()
+    poses[[70, 200], :3, 3] += 0.1
+    loop = re.search(r"in a step::\n\n(.*?)\n\n", rb.smoothing_spline.__doc__, re.DOTALL)[1]
+    names = {"np": np, "times": t, "poses": poses} | vars(rb)
     with warnings.catch_warnings(action="ignore"):
-        for _ in range(5):
-            off = rb.angle_between(rb.smoothing_spline(t, measured, weights=w)(t), measured)
-            w = np.minimum(1, 1.5 * np.median(off) / off)
-    good = off < 3 * np.median(off)
-    assert not good[[7, 40, 41, 80]].any()
-    assert good.sum() > 88
-    c = rb.smoothing_spline(t[good], measured[good])
-    assert np.sqrt(np.mean(rb.angle_between(c(t), R) ** 2)) < 0.02
+        exec(dedent(loop), names)
+    assert np.flatnonzero(~names["good"]).tolist() == [20, 70, 120, 121, 200, 240]
+    c = rb.smoothing_spline(t[names["good"]], poses[names["good"]])
+    assert c.noise == pytest.approx([0.004, 0.002], rel=0.1)
+    assert np.sqrt(np.mean(rb.angle_between(c(t)[:, :3, :3], true[:, :3, :3]) ** 2)) < 0.004
 
 
 def test_a_curve_outside_the_domain_is_announced():
@@ -225,6 +231,16 @@ def test_a_curve_outside_the_domain_is_announced():
     exact, _ = wandering(T, 0.3)
     with pytest.warns(RuntimeWarning, match="finds nothing to smooth, so the noise is not known"):
         rb.smoothing_spline(T, exact)
+    with pytest.warns(RuntimeWarning, match="nothing is smoothed; some poses are wrong, or noise"):
+        rb.smoothing_spline(T, NOISY, noise=1e-9)
+
+
+def test_a_period_that_is_too_long_for_weights_that_differ_is_refused():
+    t = np.arange(2000.0)
+    w = np.where(np.arange(2000) % 2, 1e-6, 1)
+    R = rb.exp_so3(t[:, None] * [0, 0, 1e-9])
+    with pytest.raises(ValueError, match=r"^period: a shorter one .* weights from 1e-06 to 1$"):
+        rb.smoothing_spline(t, R, weights=w, period=1e8)
 
 
 @pytest.mark.parametrize(
@@ -234,6 +250,7 @@ def test_a_curve_outside_the_domain_is_announced():
         ({"noise": 0}, r"noise\[0\] is 0.0, a number above 0"),
         ({"period": [1, 2]}, "period: one is wanted"),
         ({"weights": -W}, r"weights\[0\] is -"),
+        ({"weights": W**40}, "weights: a ratio of at most 1e\\+06 is wanted, got"),
         ({"weights": W[:5]}, "times, poses, weights: equal numbers are wanted, got 40"),
         ({"ends": "periodic"}, "ends: 'natural' or 'rest' is wanted"),
         ({"times": T[::-1]}, r"times\[1\] is .*, a time from .* on is wanted"),

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.interpolate import make_smoothing_spline
+from scipy.interpolate import CubicHermiteSpline, make_smoothing_spline
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation, RotationSpline
 
@@ -127,12 +127,18 @@ def by_vectors(t: Array, R: Array) -> Smooth:
     """Return SciPy's smoothing spline of unwrapped rotation vectors about the mean."""
     base, x = _vectors(R)
     splines = [make_smoothing_spline(t, column) for column in x.T]
+    return _of_vectors(base, lambda t, k: np.stack([s(t, k) for s in splines], axis=-1))
+
+
+def _of_vectors(base: Array, x: Callable[[Array, int], Array]) -> Smooth:
+    """Return the rotations base exp(x), given x(t, order)."""
 
     def curve(t: Array, order: int = 0) -> Array:
-        x, rate = (np.stack([s(t, k) for s in splines], axis=-1) for k in (0, 1))
-        return rb.right_jacobian_so3(x) @ rate[..., None] if order else base @ rb.exp_so3(x)
+        if order == 0:
+            return base @ rb.exp_so3(x(t, 0))
+        return (rb.right_jacobian_so3(x(t, 0)) @ x(t, 1)[..., None])[..., 0]
 
-    return _with_differences(lambda t, order: curve(t, order)[..., 0] if order else curve(t))
+    return _with_differences(curve)
 
 
 def by_quaternions(t: Array, R: Array) -> Smooth:
@@ -162,9 +168,10 @@ def moving_average(t: Array, R: Array, window: int) -> Smooth:
 
 
 def savitzky_golay(t: Array, R: Array, window: int) -> Smooth:
-    """Return SciPy's spline through rotation vectors after a Savitzky–Golay filter."""
+    """Return rotation vectors with the values and the slopes of a Savitzky–Golay filter."""
     base, x = _vectors(R)
-    return interpolated(t, base @ rb.exp_so3(savgol_filter(x, window, 3, axis=0)))
+    values, slopes = (savgol_filter(x, window, 3, k, t[1] - t[0], axis=0) for k in (0, 1))
+    return _of_vectors(base, CubicHermiteSpline(t, values, slopes))
 
 
 def _vectors(R: Array) -> tuple[Array, Array]:
@@ -211,7 +218,7 @@ def methods(motion: Motion, sigma: float) -> dict[str, Callable[[Array, Array], 
         "rotation vectors": by_vectors,
         "quaternions": by_quaternions,
         "moving average*": partial(_best, moving_average, range(3, 26, 2), motion),
-        "Savitzky-Golay*": partial(_best, savitzky_golay, range(5, 42, 4), motion),
+        "Savitzky-Golay*": partial(_best, savitzky_golay, range(5, 102, 8), motion),
         "smoothing_spline": rb.smoothing_spline,
         "with the noise": partial(rb.smoothing_spline, noise=sigma),
         "optimum": rb.optimum.minimum_acceleration_smoothing,

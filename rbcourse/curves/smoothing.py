@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, Self
 
@@ -40,6 +41,7 @@ from rbcourse.quaternion import continuous_quaternions, quaternion_conjugate, qu
 from rbcourse.so3 import vee
 
 LEAST, STEP, MOST = -12.0, 1.5, 28.0  # of log λ, if the mean step and the mean weight are 1
+_RATIO = 1e6  # of weights; with 1e12, a period of 1,000 steps gives a noise that is wrong by 30 %
 _DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
 
 
@@ -96,7 +98,8 @@ def smoothing_spline(
         a pair may be given, for the rotation and the origin. Without `noise` and `period`,
         generalised cross validation chooses the period.
     weights : array_like, shape (N,), optional
-        Positive weights; the variance of the noise of a pose is noise² divided by its weight.
+        Positive weights; the variance of the noise of a pose is noise² divided by its weight. Omit
+        a wrong pose; cross validation counts it even if its weight is small.
 
     Returns
     -------
@@ -107,21 +110,32 @@ def smoothing_spline(
     Warns
     -----
     RuntimeWarning
-        If the body turns by more than 1 rad in the time period/2π, or if nothing is smoothed.
+        If the body turns by more than 1 rad in the time period/2π, or if, without a given period,
+        nothing is smoothed.
 
     Notes
     -----
-    Moved rotations give the moved curve; reversed times reverse it. A pose of another point of the
-    body is smoothed differently, since the origin is. If the body turns by θ in the time period/2π,
-    the cost Σ wᵢ ‖R(tᵢ) − Rᵢ‖² + λ ∫ 2 ‖w'‖² dt is larger than the least by about 0.05 θ⁴ of it.
-    Singular set: that of `quaternion_spline`. Wrong poses need small weights; this loop finds them,
-    and then ``times[good]`` and ``poses[good]`` are smoothed::
+    The rotations have nearly the least Σ wᵢ ‖R(tᵢ) − Rᵢ‖² + λ ∫ 2 ‖w'‖² dt, where λ is
+    (period/2π)⁴ times the mean weight over the mean step; if the body turns by θ in the time
+    period/2π, the sum is larger than the least by about 0.05 θ⁴ of it. The errors of different
+    poses must be independent; for tracked poses whose errors change slowly, give a period. Natural
+    ends have no acceleration. If the body accelerates there, the velocity is wrong near the ends.
 
-        w = np.ones(len(times))
+    Moved rotations give the moved curve; reversed times reverse it. A pose of another point of the
+    body is smoothed differently, since the origin is. Singular set: that of `quaternion_spline`.
+
+    A large ``noise`` of the result is a sign of wrong poses. This loop finds them, and then
+    ``times[good]`` and ``poses[good]`` are smoothed. For rotations, off is turn / median(turn). The
+    period of ten steps is for bodies that turn by less than 10° in a step::
+
+        w, ten = np.ones(len(times)), 10 * np.median(np.diff(times))
         for _ in range(5):
-            off = angle_between(smoothing_spline(times, R, weights=w)(times), R)
-            w = np.minimum(1, 1.5 * np.median(off) / off)
-        good = off < 3 * np.median(off)
+            S = smoothing_spline(times, poses, period=ten, weights=w)(times)
+            turn = angle_between(S[:, :3, :3], poses[:, :3, :3])
+            move = np.linalg.norm(S[:, :3, 3] - poses[:, :3, 3], axis=1)
+            off = np.maximum(turn / np.median(turn), move / np.median(move))
+            w = np.minimum(1, 1.5 / off)
+        good = off < 5
 
     Examples
     --------
@@ -146,8 +160,8 @@ def smoothing_spline(
         )
     if A.shape[-1] == 4:
         c = with_origins(c, RigidMotion, smoother, A[:, :3, 3], noises[1], periods[1])
-    if noise is None and period is None:
-        smoother.check_noise(c.period)
+    if period is None:
+        smoother.check_noise(c.period, noise)
     return c
 
 
@@ -245,6 +259,10 @@ def _checked_data(times: ArrayLike, poses: Array, weights: ArrayLike | None) -> 
         i = late[0]
         raise ValueError(f"times[{i + 1}] is {times[i + 1]}, a time from {times[i]} on is wanted")
     check_all(w > 0, "weights", w, "a number above 0")
+    if w.max() > _RATIO * w.min():
+        raise ValueError(
+            f"weights: a ratio of at most {_RATIO:g} is wanted, got {w.max() / w.min():g}"
+        )
     if len(np.unique(times)) < 3:
         raise ValueError("times: three or more different ones are wanted")
     return times, w
@@ -356,7 +374,9 @@ class Smoother:
 
         def score(log: float) -> float:
             smoothing = float(np.exp(log))
-            return self.score(misfit(smoothing), smoothing, noise)
+            with suppress(np.linalg.LinAlgError):
+                return self.score(misfit(smoothing), smoothing, noise)
+            return np.inf
 
         if period is not None:
             smoothing = (period / (2 * np.pi * self.unit)) ** 4
@@ -366,7 +386,12 @@ class Smoother:
             bounds, options = (best - STEP, best + STEP), {"xatol": 0.05}
             found = minimize_scalar(score, bounds=bounds, method="bounded", options=options)
             smoothing = float(np.exp(found.x))
-        return self.found(misfit(smoothing), smoothing)
+        try:
+            return self.found(misfit(smoothing), smoothing)
+        except np.linalg.LinAlgError as error:
+            some = f"times from {self.knots[0]:g} to {self.knots[-1]:g}, weights from "
+            some += f"{self.total.min():g} to {self.total.max():g}"
+            raise ValueError(f"period: a shorter one is wanted for {some}") from error
 
     def found(self, misfit: float, smoothing: float) -> Smoothing:
         """Return a smoothing with its period, and with the noise that its misfit shows."""
@@ -377,12 +402,10 @@ class Smoother:
         """Return the period of which an oscillation keeps half of its amplitude."""
         return float(2 * np.pi * self.unit * smoothing**0.25)
 
-    def check_noise(self, periods: Any) -> None:
+    def check_noise(self, periods: Any, noise: ArrayLike | None) -> None:
         """Warn if the best of the tried periods is the least one."""
         if np.min(periods) < self.period(np.exp(LEAST + STEP)):
-            warnings.warn(
-                "cross validation finds nothing to smooth, so the noise is not known; give "
-                "noise or period",
-                RuntimeWarning,
-                stacklevel=3,
-            )
+            why = "cross validation finds nothing to smooth, so the noise is not known; give noise"
+            if noise is not None:
+                why = "nothing is smoothed; some poses are wrong, or noise is too small; change it"
+            warnings.warn(f"{why} or period", RuntimeWarning, stacklevel=3)

@@ -104,9 +104,11 @@ def minimum_acceleration_smoothing(
 
     Notes
     -----
-    The chain is ``certified`` if it is proven that all nearby curves have a larger sum. As the
-    period grows, the curve tends to the best steady turn. If the body turns far between two
-    measurements, another minimum may be less. Singular set: that of `quaternion_spline`.
+    The chain is ``certified`` if it is proven that all nearby curves have a larger sum. It takes
+    about five times as long as `smoothing_spline`, and is better if the body turns by more than
+    0.2 rad in the time period/2π. As the period grows, the curve tends to the best steady turn. If
+    the body turns far between two measurements, another minimum may be less. Singular set: that of
+    `quaternion_spline`.
 
     Examples
     --------
@@ -122,8 +124,8 @@ def minimum_acceleration_smoothing(
     if A.shape[-1] == 4:
         c = with_origins(c, OptimalMotion, smoother, A[:, :3, 3], noises[1], periods[1])
         c = replace(c, cost=c.cost + c.body.mass * float(np.sum(c.legs.moving_cost)))
-    if noise is None and period is None:
-        smoother.check_noise(c.period)
+    if period is None:
+        smoother.check_noise(c.period, noise)
     return c
 
 
@@ -133,6 +135,9 @@ class OptimalSmoothing(OptimalChain):
 
     period: Any
     noise: Any
+
+    def _what(self) -> str:
+        return f"Optimum of acceleration near poses at {len(self.times)} times"
 
     def lasting(self, duration: Array) -> Self:
         """Return the chain with another duration; the first time is kept."""

@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from scipy.interpolate import make_smoothing_spline
 
 import rbcourse as rb
 from rbclassroom.figures import name_lines, named
@@ -56,6 +57,20 @@ def distance(a: Array, b: Array) -> float:
     """Return the root mean square of the angles between rotations, in degrees."""
     angles = rb.angle_between(a, b)
     return float(np.degrees(np.sqrt(np.mean(angles**2))))
+
+
+def wrong_rate(curve: Curve, truth: Curve) -> float:
+    """Return the root mean square of the error of w, in degrees for a unit of time."""
+    t = np.linspace(*truth.domain, 3201)
+    wrong = np.linalg.norm(curve(t, 1) - truth(t, 1), axis=1)
+    return float(np.degrees(np.sqrt(np.mean(wrong**2))))
+
+
+def projected_entries(t: Array, R: Array, period: float) -> Array:
+    """Return the rotations nearest to SciPy's smoothing splines of the entries of matrices."""
+    smoothing = (period / (2 * np.pi)) ** 4 / np.diff(t).mean()
+    columns = [make_smoothing_spline(t, x, lam=smoothing)(t) for x in R.reshape(-1, 9).T]
+    return rb.project_so(np.stack(columns, axis=-1).reshape(R.shape))
 
 
 def validation_table(
