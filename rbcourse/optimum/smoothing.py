@@ -69,7 +69,7 @@ STEPS = 30  # of Newton's method for one smoothing; then it has failed
 SAFE = 0.5  # rad: a closed form is a good start if the body turns less in the time period/2π
 CLEAR = 1e-12  # of the diagonal, which grows with the fourth power of the period; rounding is less
 LAST = 1e-8  # rad: a longer step is not the last one; by rounding, steps are shorter than 1e-9
-_TOO_FAR = "the body may turn too far in the time period/2π, or between two measurements"
+TOO_FAR = "the body may turn too far in the time period/2π, or between two measurements"
 BEYOND = 2  # steps without a better score after which the search ends
 
 
@@ -105,8 +105,8 @@ def minimum_acceleration_smoothing(
     Notes
     -----
     The chain is ``certified`` if it is proven that all nearby curves have a larger sum. It takes
-    about five times as long as `smoothing_spline`, and is better if the body turns by more than
-    0.2 rad in the time period/2π. As the period grows, the curve tends to the best steady turn. If
+    about ten times as long as `smoothing_spline`, and is better if the body turns by more than 0.2
+    rad in the time period/2π. As the period grows, the curve tends to the best steady turn. If
     the body turns far between two measurements, another minimum may be less. Singular set: that of
     `quaternion_spline`.
 
@@ -150,9 +150,8 @@ def _rotations(problem: _Problem, noise: float | None, period: float | None) -> 
     first = R[smoother.first]
     speeds = angle_between(first[:-1], first[1:]) / np.diff(smoother.knots)
     safe = 2 * np.pi * SAFE / max(float(np.median(speeds)), 1e-300)
-    if period is None or period < safe:
-        start = closed_form(smoother, R, noise, period)
-    if (period is not None and period >= safe) or start.period >= safe:
+    start = closed_form(smoother, R, noise, period and min(period, safe))
+    if start.period > safe:
         start = closed_form(smoother, R, None, safe)
     log = 4 * np.log(start.period / smoother.period(1.0))
     goal = log if period is None else 4 * np.log(period / smoother.period(1.0))
@@ -167,7 +166,7 @@ def _rotations(problem: _Problem, noise: float | None, period: float | None) -> 
             break
         state = state._replace(unknowns=legs.equations.refined(legs.unknowns, more))
     if legs.tail > EXACT:
-        raise ConvergenceError(legs.tail, state.steps, _TOO_FAR)
+        raise ConvergenceError(legs.tail, state.steps, TOO_FAR)
     return problem.curve(state, legs, goal)
 
 
@@ -292,7 +291,7 @@ class _Problem(NamedTuple):
                 responses = responses_of(legs)
                 _, change = minimum(self.system(state, legs, responses, np.exp(log)), self.ends)
                 state, turned = self.stepped(state, legs, responses, change)
-        raise ConvergenceError(turned, state.steps, _TOO_FAR)
+        raise ConvergenceError(turned, state.steps, TOO_FAR)
 
     def stepped(
         self, state: _State, legs: Legs, responses: Change, change: Array
