@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from scipy.interpolate import make_smoothing_spline
 
 import rbcourse as rb
-from rbclassroom.figures import name_lines, named
+from rbclassroom.figures import name_lines, named, rounded
 from rbcourse import Array, Curve
 from rbcourse.draw.save import COLOURS, PALE, Table
 
@@ -34,10 +34,11 @@ def hand() -> Curve:
 
 
 def speeds(curves: dict[str, Curve], order: Literal[1, 2], samples: int = 1601) -> Table:
-    """Return the norms of w (order 1) or w' (order 2) of curves on SO(3) over time."""
+    """Return the norms of w (order 1) or w' (order 2) of curves on SO(3), to four decimals."""
     t = np.linspace(*next(iter(curves.values())).domain, samples)
     unit = " [rad/s]" if order == 1 else " [rad/s²]"
-    found = {name + unit: np.linalg.norm(c(t, order), axis=1) for name, c in curves.items()}
+    norms = {name: np.linalg.norm(c(t, order), axis=1) for name, c in curves.items()}
+    found = {name + unit: np.round(x, 4) for name, x in norms.items()}
     return {"t [s]": t, **found}
 
 
@@ -89,7 +90,8 @@ def validation_table(
         share = misfit / (3 * c.noise**2) / len(t)
         rows.append(np.radians([near, near / share, distance(c(t), truth(t))]))
     names = (f"{name} [rad]" for name in _ERRORS)
-    return {"period [s]": np.asarray(periods), **dict(zip(names, np.transpose(rows), strict=True))}
+    columns = rounded(np.transpose(rows))
+    return {"period [s]": np.asarray(periods), **dict(zip(names, columns, strict=True))}
 
 
 def draw_validation(ax: Axes, data: Table, best: float) -> None:
@@ -104,6 +106,12 @@ def draw_validation(ax: Axes, data: Table, best: float) -> None:
     ax.set_yticks([0.1, 1, 10], ["0.1", "1", "10"])
     name_lines(ax, {"from the measured poses": (0.2, 0.6), "from the hand": (0.12, 0.22)})
     name_lines(ax, {"from an omitted pose": (0.06, 2)})
+
+
+def distances(truth: Curve, t: Array, curves: dict[str, Array]) -> Table:
+    """Return the angles between rotations and a curve at the times t, to six decimals, in rad."""
+    angles = {name: rb.angle_between(R, truth(t)) for name, R in curves.items()}
+    return {"t [s]": t} | {f"{name} [rad]": np.round(x, 6) for name, x in angles.items()}
 
 
 def draw_distances(ax: Axes, data: Table) -> None:
