@@ -10,13 +10,12 @@ import csv
 import io
 import re
 import unicodedata
-import zlib
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any, NamedTuple
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from rbclassroom.assignments.locked_cells import decode, grade_id, read_notebook
 from rbclassroom.assignments.safe_files import write_csv, write_whole
@@ -30,10 +29,8 @@ CANVAS = re.compile(
 )
 JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_Store)$")
 FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
-# zipfile raises RuntimeError if a zip has a password or an unknown kind of compression
-BROKEN = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError)
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
-LISTS += ["not on the roster", "missing"]
+LISTS += ["nothing usable", "not on the roster", "missing"]
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
 
 
@@ -59,15 +56,21 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     sets, roster = _read_sets(assignments), _read_roster(assignments / "students.csv")
     submitted, rows = assignments / "submitted", list[Row]()
     groups = defaultdict[tuple[str, str, str], list[Upload]](list)
+    unused = defaultdict[str, list[str]](list)  # files of each student that hold no notebook
     for found in _find(folder):
         if not isinstance(found, Upload):
             rows.append(found)
+            for owner in filter(None, map(_owner, found[1].split(": "))):
+                unused[f"{owner['name'] or ''} {owner['id'] or ''}".strip()].append(found[1])
             continue
         name, why = _match(found, sets)
         if why:
             rows.append(("unmatched", found.file, why))
         else:
             groups[name, _student(found.about, roster), found.about["id"]].append(found)
+    for uploads in groups.values():
+        unused.pop(f"{uploads[0].about['name']} {uploads[0].about['id']}".strip(), None)
+    rows += [("nothing usable", who, ", ".join(names)) for who, names in sorted(unused.items())]
     namesakes = Counter((name, student) for name, student, _ in groups)
     for (name, student), several in namesakes.items():
         if several > 1 and (submitted / student / name).exists():
@@ -116,20 +119,34 @@ def _look(label: str, name: str, stream: IO[bytes], date: datetime) -> Iterator[
     try:
         if JUNK.search(f"/{owner['file'] if owner else name}"):
             yield "ignored", label, "it is not a file to submit"
-        elif suffix == ".zip":
+            return
+        if suffix == ".zip":
             with ZipFile(stream) as zipped:
                 yield from _look_into(zipped, label, name, date)
-        elif suffix != ".ipynb":
+            return
+        content = stream.read(FILE_BYTES + 1)
+        large = len(content) > FILE_BYTES
+        if suffix != ".ipynb" and (large or not _holds_notebook(content)):
             yield "ignored", label, "it is neither a notebook nor a zip"
+        elif large:
+            raise ValueError("it is too large")
         elif not owner:
             yield "unmatched", label, "its name does not contain a student"
         else:
-            read_notebook(content := stream.read(), "it")
+            read_notebook(content, "it")
             about = {key: value or "" for key, value in owner.groupdict().items()}
             number, prepared = int(about.get("number", 0)), "/to_submit/" in f"/{about['file']}"
             yield Upload(number, _written(date), prepared, label, about, content)
-    except BROKEN as error:
-        yield "refused", label, str(error)
+    except Exception as error:  # a damaged zip raises many kinds of errors
+        yield "refused", label, str(error) or type(error).__name__
+
+
+def _holds_notebook(content: bytes) -> bool:
+    """Tell whether a file with any name is a notebook; browsers add .json or .txt to the name."""
+    with contextlib.suppress(ValueError):
+        text = decode(content).lstrip()
+        return text.startswith("{") and ('"cells"' in text or '"worksheets"' in text)
+    return False
 
 
 def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterator[Upload | Row]:
@@ -139,17 +156,22 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterat
     upload, size = _owner(name) and not whole, sum(entry.file_size for _, entry in entries)
     if upload and (".zip/" in name.lower() or size > UPLOAD_BYTES):
         raise ValueError("it contains a zip, or too many bytes; unpack it by hand")
+    total = 0
     for inner, entry in entries:
-        wanted = inner.lower().endswith((".ipynb", ".zip"))
+        most = UPLOAD_BYTES if inner.lower().endswith(".zip") else FILE_BYTES
         try:
-            if wanted and entry.file_size > FILE_BYTES:
-                raise ValueError("it is too large")
-            content = zipped.read(entry) if wanted else b""
+            if entry.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
+                raise ValueError("its kind of compression is not accepted; zip it again")
+            with zipped.open(entry) as stream:  # the declared size may be wrong
+                content = stream.read(most + 1)
             # dates in a zip of a student are not used
             when = date if upload else datetime(*entry.date_time)
-        except BROKEN as error:
-            yield "refused", f"{label}: {inner}", str(error)
+        except Exception as error:  # a damaged zip raises many kinds of errors
+            yield "refused", f"{label}: {inner}", str(error) or type(error).__name__
             continue
+        total += len(content)
+        if upload and total > UPLOAD_BYTES:
+            raise ValueError("it contains a zip, or too many bytes; unpack it by hand")
         full = f"{name}/{inner}" if upload else inner
         yield from _look(f"{label}: {inner}", full, io.BytesIO(content), when)
 

@@ -280,6 +280,57 @@ def test_only_unsafe_files_are_refused(course):
     assert len(of("ignored", rows)) == 2
 
 
+@pytest.mark.parametrize("file", ["ps1.ipynb.json", "ps1.ipynb.txt", "ps1 (2)", "ps1.JSON"])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_notebooks_are_recognised_by_their_content(course, file, encoding):
+    content = answered(course).decode().encode(encoding)
+    for entries in (
+        {moodle("A_1", file): content},
+        {moodle("A_1", "w.zip"): packed({file: content})},
+    ):
+        rows = collected(course, {"all.zip": packed(entries)})
+        assert len(of("collected", rows) + of("unchanged", rows)) == 1
+        assert files(course) == {"a/ps1": "mine"}
+
+
+def test_students_who_handed_in_nothing_usable_are_listed(course):
+    good = answered(course)
+    entries = {
+        moodle("A B_1", "essay.pdf"): b"%PDF-1.7",
+        moodle("A B_1", "ps1.py"): b"print(1)",
+        moodle("C_2", "work.zip"): packed({"ps1.html": b"<html>"}),
+        moodle("D_3", "ps1.ipynb"): b"{}",
+        moodle("E_4", "notes.pdf"): b"%PDF-1.7",
+        moodle("E_4", "ps1.ipynb"): good,
+    }
+    rows = collected(course, {"all.zip": packed(entries), "readme.txt": b"words"})
+    found = dict(of("nothing usable", rows))
+    assert [*found] == ["A B 1", "C 2", "D 3"]
+    assert found["A B 1"].count("essay.pdf") == found["A B 1"].count("ps1.py") == 1
+    assert files(course).keys() == {"e/ps1"}
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
+def test_other_kinds_of_compression_are_refused_one_by_one(course, method):
+    """A short file in bzip2 can hold gigabytes."""
+    inside = packed({"ps1.ipynb": answered(course)}, method=method)
+    entries = {moodle("A_1", "w.zip"): inside, moodle("B_2"): answered(course)}
+    rows = collected(course, {"all.zip": packed(entries)})
+    assert "compression is not accepted" in of("refused", rows)[0][1]
+    assert files(course).keys() == {"b/ps1"}
+
+
+def test_a_size_that_is_declared_too_small_does_not_fill_the_memory(course):
+    bomb = bytearray(packed({moodle("A_1"): bytes(40_000_000)}, method=zipfile.ZIP_DEFLATED))
+    for mark, place in ((b"PK\x03\x04", 22), (b"PK\x01\x02", 24)):
+        start = bomb.index(mark) + place
+        bomb[start : start + 4] = (100).to_bytes(4, "little")
+    zips = {"all.zip": bytes(bomb), "b.zip": packed({moodle("B_2"): answered(course)})}
+    rows = collected(course, zips)
+    assert len(of("refused", rows)) == 1
+    assert files(course).keys() == {"b/ps1"}
+
+
 @pytest.mark.skipif(os.name == "nt", reason="links need a permission on Windows")
 def test_symbolic_links_are_not_followed(course):
     folder = course.parents[1] / "downloads"
