@@ -361,6 +361,13 @@ def test_the_optimum_is_found_where_the_closed_form_is_far_from_it():
         assert of_both[0] < 0.98 * of_both[1]
 
 
+def test_the_cost_of_an_optimum_near_poses_has_both_parts():
+    c = minimum_acceleration_smoothing(T, POSES)
+    assert c.cost == pytest.approx(rb.acceleration_cost(c), rel=1e-9)
+    assert rb.acceleration_cost_parts(c)[1] > 1e-3 * c.cost
+    assert repr(c).startswith("<Optimum of acceleration near poses at 40 times")
+
+
 def test_the_optimum_finds_its_own_period():
     """At 60° a step, the cross validation of the closed form finds nothing to smooth."""
     t, rng = np.arange(60.0), np.random.default_rng(5)

@@ -260,8 +260,7 @@ class _Problem(NamedTuple):
     def equations(self, R: Array, w: Array) -> _Legs:
         h = self.h[:, None]
         rates = np.stack([h * w[:-1], h * w[1:]], axis=1)
-        coarse = 9 if R.shape[1] < 33 else 17
-        return _Legs(BallAcceleration(), R[:, 0], R[:, -1], rates, coarse)
+        return _Legs(BallAcceleration(), R[:, 0], R[:, -1], rates, coarse=9)
 
     def legs(self, state: _State) -> Legs:
         now = state.unknowns

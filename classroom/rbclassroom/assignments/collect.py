@@ -160,9 +160,10 @@ def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterat
     for inner, entry in entries:
         most = UPLOAD_BYTES if inner.lower().endswith(".zip") else FILE_BYTES
         try:
+            # one small block of bzip2 or LZMA can become gigabytes
             if entry.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
                 raise ValueError("its kind of compression is not accepted; zip it again")
-            with zipped.open(entry) as stream:  # the declared size may be wrong
+            with zipped.open(entry) as stream:
                 content = stream.read(most + 1)
             # dates in a zip of a student are not used
             when = date if upload else datetime(*entry.date_time)
