@@ -1,5 +1,6 @@
 """A problem set as a teacher writes it: two small problems, and one question in words."""
 
+import re
 from pathlib import Path
 
 import nbformat
@@ -37,7 +38,8 @@ def marked(cell, grade_id, points=None, **kind):
 
 
 def _answer(source, grade_id):
-    text = f"### BEGIN SOLUTION\n{source}\n### END SOLUTION"
+    head, body = re.fullmatch(r"(def .*\n)?([^\0]*)", source).groups(default="")
+    text = f"{head}{'    ' * bool(head)}### BEGIN SOLUTION\n{body}\n### END SOLUTION"
     return marked(new_code_cell(text), grade_id, locked=False, solution=True)
 
 

@@ -11,12 +11,13 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import bleach
 import nbformat
 from jinja2 import pass_context
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbconvert.exporters import NotebookExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
 from nbformat import NotebookNode
@@ -26,8 +27,9 @@ from traitlets import Bool, Integer
 from traitlets.config import Config
 
 from rbclassroom.assignments import locked_cells, sandbox
-from rbclassroom.assignments.locked_cells import Refused, marks_of, name_cell
+from rbclassroom.assignments.locked_cells import marks_of, name_cell
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
+from rbclassroom.assignments.submissions import Refused, read_notebook, restore
 
 UNSEEN = "The visible tests pass, but a hidden test fails.\n"
 # students' HTML is shown without elements that run, load files or imitate the page
@@ -47,6 +49,7 @@ def configure(config: Config) -> None:
         path = os.environ.get("PATH", os.defpath)
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
     end = nbgrader.CheckCellMetadata
+    config.Autograde.exporter_class = ReadSubmission
     config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
     run = [BoxedExecute, nbgrader.IgnorePattern, nbgrader.SaveAutoGrades]
     config.Autograde.autograde_preprocessors = [*run, nbgrader.AssignLatePenalties, end]
@@ -100,6 +103,19 @@ def inert_markdown(context: Any, source: str) -> str:
     return inert_html(MarkdownWithMath(renderer=renderer).render(source))
 
 
+class ReadSubmission(NotebookExporter):
+    """Read submissions as the students' check does."""
+
+    def from_file(self, file_stream: Any, *args: Any, **settings: Any) -> Any:
+        """Return the converted notebook in an open file, and its resources."""
+        step: Any = self.parent
+        if not step._sanitizing:  # the notebook was restored before
+            return super().from_file(file_stream, *args, **settings)
+        path, exporter = Path(file_stream.name), cast(Any, self)
+        notebook = read_notebook(path.read_bytes(), path.name)
+        return exporter.from_notebook_node(notebook, *args, **settings)
+
+
 class RestoreCells(nbgrader.OverwriteCells):  # the base class adds the hidden tests
     """Restore the locked cells and the hidden tests."""
 
@@ -108,7 +124,7 @@ class RestoreCells(nbgrader.OverwriteCells):  # the base class adds the hidden t
         about, course = resources["nbgrader"], self.parent.parent.coursedir
         released = course.format_path(course.release_directory, ".", about["assignment"])
         original = nbformat.read(Path(released, f"{about['notebook']}.ipynb"), as_version=4)
-        remarks = locked_cells.restore(nb, original)
+        remarks = restore(nb, original)
         if len(remarks) > 2:
             remarks[1:] = [f"and {len(remarks) - 1} more changes"]
         for cell in nb.cells:  # nbgrader fails if a student's cell has these words

@@ -7,7 +7,6 @@ import io
 import logging
 import os
 import re
-import shutil
 import sys
 import tempfile
 import time
@@ -22,6 +21,7 @@ from rbclassroom.assignments import locked_cells
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test, name_cell
 from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient
 from rbclassroom.assignments.safe_files import write_whole
+from rbclassroom.assignments.submissions import count_found, read_notebook, restore
 from rbclassroom.course import options
 from rbclassroom.course.notebooks import KERNEL
 
@@ -30,25 +30,24 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
 
     The student's files are not changed. The file to submit has the locked cells of the original.
+    As in grading, the notebook runs in a folder with the files of the set only.
     """
-    if not path.exists():
-        raise ValueError(f"{path} does not exist; give the path of your notebook")
-    if path.suffix != ".ipynb":
-        raise ValueError(f"{path.name} is not a notebook; give the file that ends with .ipynb")
-    notebook = locked_cells.read_notebook(path.read_bytes(), path.name)
-    name, given = _find_original(path)
-    original = locked_cells.read_notebook(given, name)
+    if not path.is_file():
+        raise ValueError(f"{path} is not a file; give the path of your notebook")
+    notebook = read_notebook(path.read_bytes(), path.name)
+    name, files = _find_set(notebook, path.parent)
+    original = nbformat.reads(files.pop(name).decode(), as_version=4)
     saved = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     print(f"checking {path.name}, last saved {saved}", flush=True)
     print("cell numbers count all cells, as JupyterLab does at the bottom of its window")
     if path.name != name:
         print(f"the file has to be submitted under the name {name}")
-    remarks = locked_cells.restore(notebook, original)
+    remarks = restore(notebook, original)
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
-        for file in path.parent.iterdir():
-            if file.is_file() and file.suffix not in (".whl", ".zip"):
-                shutil.copy(file, own)
+        Path(own, "work").mkdir()
+        for file, content in files.items():
+            write_whole(Path(own, "work", file), content)
         remarks += _run(notebook, Path(own), seconds)
     print("".join(f"- {what}\n" for what in remarks), end="")
     passed = _print_problems(notebook, original)
@@ -60,20 +59,28 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     return target
 
 
-def _find_original(path: Path) -> tuple[str, bytes]:
-    """Return the name and the content of the original notebook of a set."""
-    folder, course = path.parent / "original", Path("notebooks", "assignments")
-    if course.is_dir() and not folder.exists():
-        from rbclassroom.assignments.handout import release  # this needs nbgrader
+def _find_set(notebook: NotebookNode, folder: Path) -> tuple[str, dict[str, bytes]]:
+    """Return the name of the original of a notebook, and the files of its set as handed out.
 
-        sets = [place.parent.name for place in course.glob("*/*/*.ipynb")]
-        name = max((s for s in sets if path.stem.startswith(s)), key=len, default=path.stem)
-        return f"{name}.ipynb", release(name, course)[f"{name}.ipynb"]
-    same = [folder / path.name] if (folder / path.name).is_file() else list(folder.glob("*.ipynb"))
-    if len(same) != 1:
-        missing = f"{folder / path.name} is missing"
+    The files are in the folder ``original`` of a handout, beside the notebook or in the current
+    folder, or the course in the current folder makes them.
+    """
+    for place in (folder / "original", Path("original")):
+        if names := sorted(path.name for path in place.glob("*.ipynb")):
+            if len(names) > 1:
+                raise ValueError(f"{place} has several notebooks; unpack the handout again")
+            paths = [path for path in place.rglob("*") if path.is_file()]
+            return names[0], {p.relative_to(place).as_posix(): p.read_bytes() for p in paths}
+    course = Path("notebooks", "assignments")
+    sources = [path for path in course.glob("*/*/*.ipynb") if path.stem == path.parent.name]
+    if not sources:
+        missing = "the folder original of the handout is missing"
         raise ValueError(f"{missing}; unpack the handout again, and work in its folder")
-    return same[0].name, same[0].read_bytes()
+    from rbclassroom.assignments.handout import release  # this needs nbgrader
+
+    shared = {path: count_found(notebook, nbformat.read(path, 4)) for path in sources}
+    best = max(sources, key=lambda path: shared[path])
+    return best.name, release(best.stem, course)
 
 
 class _Client(BoundedClient):
@@ -94,7 +101,7 @@ def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
     log.setLevel(logging.CRITICAL + 1)  # this module reports the errors itself
     cells, ends = notebook.cells, list[str]()
     client = _Client(notebook, log=log, kernel_name=KERNEL["name"], timeout=seconds)
-    client.folder, client.resources = own, {"metadata": {"path": str(own)}}
+    client.folder, client.resources = own, {"metadata": {"path": str(own / "work")}}
     try:
         client.execute(env={**os.environ, "IPYTHONDIR": str(own)})
     except (DeadKernelError, CellTimeoutError) as error:

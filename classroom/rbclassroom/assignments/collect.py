@@ -1,8 +1,10 @@
-"""Collect submissions from Moodle or Canvas downloads into the folders that nbgrader reads.
+"""Collect submissions from the downloads of an LMS into the folders that nbgrader reads.
 
-Moodle names the files in mod/assign/classes/downloader.php, and Canvas in lib/content_zipper.rb.
-The date of a file is often the date of the download. A file with a date up to the due date was in
-time; a file with a later date need not be late.
+Every file has a path through folders and zips. The path names the student as Moodle, Blackboard,
+Brightspace, ILIAS or Canvas write it; otherwise each folder belongs to one student. Moodle names
+files in mod/assign/classes/downloader.php, and Canvas in lib/content_zipper.rb. The date of a file
+is often the date of the download: a file with a date up to the due date was in time, but a file
+with a later date need not be late.
 """
 
 import contextlib
@@ -17,21 +19,47 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
-from rbclassroom.assignments.locked_cells import decode, grade_id, read_notebook
-from rbclassroom.assignments.safe_files import write_csv, write_whole
+import nbformat
+from nbformat import NotebookNode
 
-MOODLE = re.compile(
-    r"(?:.*?/)??(?P<name>[^/]+?)(?:_(?P<id>\d+))?_assignsubmission_[a-z]+(?:_?/|_)(?P<file>.+)"
-)
-CANVAS = re.compile(
-    r"(?:.*?/)??(?:(?P<name>[^/]+?)_)??(?P<late>LATE_)?(?P<id>\d+|anon_[^/_]+)"
+from rbclassroom.assignments.safe_files import write_csv, write_whole
+from rbclassroom.assignments.submissions import count_found, read_notebook
+
+CLEAR = [  # each of these patterns matches a whole path, and no other files have such names
+    re.compile(rf"(?P<above>(?:.*?/)??){pattern}")
+    for pattern in (
+        # Moodle: Anna Berg_1234567_assignsubmission_file_/ps1.ipynb
+        r"(?P<name>[^/]+?)(?:_(?P<id>\d+))?_assignsubmission_[a-z]+(?:_?/|_)(?P<file>.+)",
+        # Blackboard: Set 1_aberg_attempt_2026-11-30-23-59-00_ps1.ipynb
+        r"[^/]+_(?P<name>[^/_]+)_attempt_(?P<date>\d{4}(?:-\d\d){5})(?:_|\.txt)(?P<file>.*)",
+        # Brightspace: 397063-2557369 - Anna Berg - Nov 30, 2026 1159 PM/ps1.ipynb
+        r"\d+-\d+ ?- ?(?P<name>[^/]+?) ?- ?(?P<date>[^/-]* \d{4} \d{3,4}(?: [AP]M)?)(?:/| ?- ?)"
+        r"(?P<file>.+)",
+    )
+]
+ILIAS = re.compile(r"(?P<name>.+_.+)_[^_]+_(?P<id>\d+)")  # a folder: Berg_Anna_aberg_4711
+CANVAS = re.compile(  # a file: berganna_LATE_12345_67890_ps1.ipynb, but not 2026_11_30_ps1.ipynb
+    r"(?:(?P<name>\d*[^\W\d_].*?)_)??(?P<late>LATE_)?(?P<id>anon_[^_]+|(?!(?:19|20)\d\d_\d\d?_)\d+)"
     r"_(?P<number>\d+)_(?P<file>.+)"
 )
+DATES = "%Y-%m-%d-%H-%M-%S", "%b %d, %Y %I%M %p"  # of Blackboard and Brightspace
 JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_Store)$")
-FILE_BYTES, UPLOAD_BYTES = 30_000_000, 100_000_000
+FILE_BYTES, UPLOAD_BYTES, DOWNLOAD_BYTES = 30_000_000, 100_000_000, 4_000_000_000
+DEPTH = 4  # zips in zips
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
 LISTS += ["nothing usable", "not on the roster", "missing"]
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
+
+
+class File(NamedTuple):
+    """A file in a download, which holds a notebook if `kind` is empty."""
+
+    parts: tuple[str, ...]  # the folders, zips and names on its path
+    dates: tuple[datetime | None, ...]  # of the parts that are files or zips
+    label: str
+    kind: str  # of the row in the report
+    why: str
+    content: bytes = b""
 
 
 class Upload(NamedTuple):
@@ -56,21 +84,24 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     sets, roster = _read_sets(assignments), _read_roster(assignments / "students.csv")
     submitted, rows = assignments / "submitted", list[Row]()
     groups = defaultdict[tuple[str, str, str], list[Upload]](list)
-    unused = defaultdict[str, list[str]](list)  # files of each student that hold no notebook
-    for found in _find(folder):
-        if not isinstance(found, Upload):
-            rows.append(found)
-            for owner in filter(None, map(_owner, found[1].split(": "))):
-                unused[f"{owner['name'] or ''} {owner['id'] or ''}".strip()].append(found[1])
+    unused = defaultdict[str, list[str]](list)  # files of students without a notebook
+    files = list(_find(folder))
+    for file, about in zip(files, _owners(files), strict=True):
+        name, why = "", "neither its name nor a folder names a student"
+        if about and not file.kind:
+            name, why = _match(file, about, sets)
+        if about and not why:
+            prepared = "/to_submit/" in f"/{about['file']}"
+            place, first = (about["date"], prepared, file.label), int(about["number"] or 0)
+            upload = Upload(first, *place, about, file.content)
+            groups[name, _student(about, roster), about["id"]].append(upload)
             continue
-        name, why = _match(found, sets)
-        if why:
-            rows.append(("unmatched", found.file, why))
-        else:
-            groups[name, _student(found.about, roster), found.about["id"]].append(found)
+        rows.append((file.kind or "unmatched", file.label, file.why or why))
+        if about:
+            unused[f"{about['name']} {about['id']}".strip()].append(file.label)
     for uploads in groups.values():
         unused.pop(f"{uploads[0].about['name']} {uploads[0].about['id']}".strip(), None)
-    rows += [("nothing usable", who, ", ".join(names)) for who, names in sorted(unused.items())]
+    rows += [("nothing usable", who, ", ".join(labels)) for who, labels in sorted(unused.items())]
     namesakes = Counter((name, student) for name, student, _ in groups)
     for (name, student), several in namesakes.items():
         if several > 1 and (submitted / student / name).exists():
@@ -83,8 +114,9 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         rows.append(_take(best, submitted / who / name))
         if best.about.get("late"):
             rows.append(("late", f"{who}, {name}", "Canvas marks it as late"))
-        elif due and "number" not in best.about and best.date > _written(due):
+        elif due and not best.about["number"] and best.date > _written(due):
             why = f"perhaps: {best.date} may be the date of the download; look in Moodle"
+            why = f"handed in at {best.date}" if best.about["exact"] else why
             rows.append(("late", f"{who}, {name}", why))
         if roster and who not in {row["id"] for row in roster}:
             rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
@@ -98,83 +130,144 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     return rows
 
 
-def _find(folder: Path) -> Iterator[Upload | Row]:
-    """Yield the notebooks in a folder, in its zips, and in students' zips inside these."""
+def _find(folder: Path) -> Iterator[File]:
+    """Yield the files in a folder, in its zips, and in the zips inside these."""
     for path in sorted(folder.rglob("*")):
-        name = _shown(path.relative_to(folder).as_posix())
+        label = _shown(path.relative_to(folder).as_posix())
+        parts = tuple(label.split("/"))
+        dates = (*[None] * (len(parts) - 1), datetime.fromtimestamp(path.lstat().st_mtime))
         if path.is_symlink():
-            yield "refused", name, "it is a link"
+            yield File(parts, dates, label, "refused", "it is a link")
         elif path.is_file():
             with path.open("rb") as stream:
-                date = datetime.fromtimestamp(path.stat().st_mtime)
-                yield from _look(name, name, stream, date)
+                yield from _look(File(parts, dates, label, "", ""), stream, [DOWNLOAD_BYTES])
 
 
-def _look(label: str, name: str, stream: IO[bytes], date: datetime) -> Iterator[Upload | Row]:
-    """Yield the notebooks in a file, or the reason why it is not used.
-
-    `name` is the path of the file through all zips, and identifies the student.
-    """
-    suffix, owner = Path(name).suffix.lower(), _owner(name)
+def _look(file: File, stream: IO[bytes], room: list[int], depth: int = 0) -> Iterator[File]:
+    """Yield a file, or the files in a zip; `room` has the number of bytes that may be read."""
+    suffix = Path(file.parts[-1]).suffix.lower()
     try:
-        if JUNK.search(f"/{owner['file'] if owner else name}"):
-            yield "ignored", label, "it is not a file to submit"
-            return
-        if suffix == ".zip":
+        if JUNK.search("/" + "/".join(file.parts)):
+            yield file._replace(kind="ignored", why="it is not a file to submit")
+        elif suffix == ".zip" and depth == DEPTH:
+            raise ValueError("it is a zip in too many zips; unpack it by hand")
+        elif suffix == ".zip":
             with ZipFile(stream) as zipped:
-                yield from _look_into(zipped, label, name, date)
-            return
-        content = stream.read(FILE_BYTES + 1)
-        large = len(content) > FILE_BYTES
-        if suffix != ".ipynb" and (large or not _holds_notebook(content)):
-            yield "ignored", label, "it is neither a notebook nor a zip"
-        elif large:
-            raise ValueError("it is too large")
-        elif not owner:
-            yield "unmatched", label, "its name does not contain a student"
+                yield from _look_into(zipped, file, room, depth)
         else:
+            content = stream.read(FILE_BYTES + 1)
+            large = len(content) > FILE_BYTES
+            if suffix != ".ipynb" and (large or not _holds_notebook(content)):
+                yield file._replace(kind="ignored", why="it is neither a notebook nor a zip")
+                return
+            if large:
+                raise ValueError("it is too large")
             read_notebook(content, "it")
-            about = {key: value or "" for key, value in owner.groupdict().items()}
-            number, prepared = int(about.get("number", 0)), "/to_submit/" in f"/{about['file']}"
-            yield Upload(number, _written(date), prepared, label, about, content)
+            yield file._replace(content=content)
     except Exception as error:  # a damaged zip raises many kinds of errors
-        yield "refused", label, str(error) or type(error).__name__
+        yield file._replace(kind="refused", why=str(error) or type(error).__name__)
+
+
+def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iterator[File]:
+    entries = [entry for entry in zipped.infolist() if not entry.is_dir()]
+    # a zip of a student may hold less than the zip of a class
+    room = [min(room[0], UPLOAD_BYTES)] if depth else room
+    if sum(entry.file_size for entry in entries) > room[0]:
+        raise ValueError("it contains too many bytes; unpack it by hand")
+    for entry in entries:
+        name = _shown(entry.filename)
+        inner = [part for part in re.split(r"[/\\]", name) if part not in ("", ".", "..")] or ["?"]
+        dates = (*file.dates, *[None] * (len(inner) - 1), datetime(*entry.date_time))
+        found = File((*file.parts, *inner), dates, f"{file.label}: {name}", "", "")
+        try:
+            # one small block of bzip2 or LZMA can become gigabytes
+            if entry.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
+                raise ValueError("its kind of compression is not accepted; zip it again")
+            most = UPLOAD_BYTES if name.lower().endswith(".zip") else FILE_BYTES
+            with zipped.open(entry) as stream:
+                content = stream.read(min(most, room[0]) + 1)
+            room[0] -= len(content)
+            if room[0] < 0:
+                raise ValueError("the zip contains too many bytes; unpack it by hand")
+        except Exception as error:  # a damaged zip raises many kinds of errors
+            yield found._replace(kind="refused", why=str(error) or type(error).__name__)
+            continue
+        yield from _look(found, io.BytesIO(content), room, depth + 1)
 
 
 def _holds_notebook(content: bytes) -> bool:
     """Tell whether a file with any name is a notebook; browsers add .json or .txt to the name."""
     with contextlib.suppress(ValueError):
-        text = decode(content).lstrip()
-        return text.startswith("{") and ('"cells"' in text or '"worksheets"' in text)
+        read_notebook(content, "it")
+        return True
     return False
 
 
-def _look_into(zipped: ZipFile, label: str, name: str, date: datetime) -> Iterator[Upload | Row]:
-    entries = [(_shown(e.filename), e) for e in zipped.infolist() if not e.is_dir()]
-    # the name of a complete download may look like an upload to Canvas
-    whole = label == name and not MOODLE.fullmatch(name) and any(_owner(n) for n, _ in entries)
-    upload, size = _owner(name) and not whole, sum(entry.file_size for _, entry in entries)
-    if upload and (".zip/" in name.lower() or size > UPLOAD_BYTES):
-        raise ValueError("it contains a zip, or too many bytes; unpack it by hand")
-    total = 0
-    for inner, entry in entries:
-        most = UPLOAD_BYTES if inner.lower().endswith(".zip") else FILE_BYTES
-        try:
-            # one small block of bzip2 or LZMA can become gigabytes
-            if entry.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
-                raise ValueError("its kind of compression is not accepted; zip it again")
-            with zipped.open(entry) as stream:
-                content = stream.read(most + 1)
-            # dates in a zip of a student are not used
-            when = date if upload else datetime(*entry.date_time)
-        except Exception as error:  # a damaged zip raises many kinds of errors
-            yield "refused", f"{label}: {inner}", str(error) or type(error).__name__
-            continue
-        total += len(content)
-        if upload and total > UPLOAD_BYTES:
-            raise ValueError("it contains a zip, or too many bytes; unpack it by hand")
-        full = f"{name}/{inner}" if upload else inner
-        yield from _look(f"{label}: {inner}", full, io.BytesIO(content), when)
+def _owners(files: list[File]) -> list[dict[str, str] | None]:
+    """Return for each file the name, the id and so on of its student, or None."""
+    beside = defaultdict[tuple[str, ...], set[str]](set)  # the parts below each path
+    for file in files:
+        for at in range(len(file.parts) * (not file.kind)):
+            beside[file.parts[:at]].add(file.parts[at])
+    owners = [_owner(file, beside) for file in files]
+    # in the other downloads, the folders below a common folder belong to one student each
+    named = {f.parts[0] for f, owner in zip(files, owners, strict=True) if owner and f.parts[1:]}
+    loose = {at: f.parts for at, f in enumerate(files) if f.parts[1:] and f.parts[0] not in named}
+    folders = {parts[:-1] for at, parts in loose.items() if not files[at].kind}
+    common = max(folders, default=())[: -1 if len(folders) == 1 else None]
+    while not all(folder[: len(common)] == common for folder in folders):
+        common = common[:-1]
+    level = len(common)
+    inside = {at: p for at, p in loose.items() if p[:level] == common and p[level + 1 :]}
+    words = {parts[level]: sorted(_plain(parts[level]).split("_")) for parts in inside.values()}
+    for at, parts in inside.items():
+        same = sorted(name for name in words if words[name] == words[parts[level]])
+        number = str(same.index(parts[level]) + 1) if same[1:] else ""  # folders with one name
+        found = {"name": parts[level].removesuffix(".zip"), "id": number}
+        owners[at] = _about({**found, "file": "/".join(parts[level + 1 :])}, files[at], level)
+    return owners
+
+
+def _owner(file: File, beside: dict[tuple[str, ...], set[str]]) -> dict[str, str] | None:
+    """Return the data of a student in the names that an LMS gives, or None."""
+    for pattern in CLEAR:
+        if match := pattern.fullmatch("/".join(file.parts)):
+            return _about(match.groupdict(), file, match["above"].count("/"))
+    for at, part in enumerate(file.parts):
+        siblings, rest = beside[file.parts[:at]], "/".join(file.parts[at + 1 :])
+        several = len(siblings) > 1 and all(map(ILIAS.fullmatch, siblings))
+        if rest and several and (match := ILIAS.fullmatch(part)):
+            return _about({**match.groupdict(), "file": rest}, file, at)
+        inside = beside[file.parts[: at + 1]]  # of a zip
+        is_file = not rest or part.lower().endswith(".zip")
+        whole = at == 0 and rest and inside and all(map(CANVAS.fullmatch, inside))
+        match = CANVAS.fullmatch(part)
+        if match and is_file and not whole and _is_class(file.parts[:at], siblings):
+            name = "/".join(filter(None, (match["file"], rest)))
+            return _about({**match.groupdict(), "file": name}, file, at)
+    return None
+
+
+def _is_class(above: tuple[str, ...], siblings: set[str]) -> bool:
+    """Tell whether a path has files of a class, or is the folder of one student.
+
+    A student, too, can give names that look like those of Canvas.
+    """
+    matches = [CANVAS.fullmatch(name) for name in siblings]
+    several = len({match["id"] for match in matches if match}) > 1
+    top = not above or (len(above) == 1 and above[0].lower().endswith(".zip"))
+    return top or (several and all(matches))
+
+
+def _about(found: dict[str, Any], file: File, at: int) -> dict[str, str]:
+    """Complete the data of a student; the date is that of the upload, not of a file in a zip."""
+    about = dict.fromkeys(("name", "id", "late", "number", "file", "exact"), "")
+    about |= {key: value or "" for key, value in found.items()}
+    date = next(date for date in file.dates[at:] if date)
+    for form in DATES:
+        with contextlib.suppress(ValueError):
+            date, about["exact"] = datetime.strptime(about.get("date", ""), form), "yes"
+    return about | {"date": _written(date)}
 
 
 def _shown(name: str) -> str:
@@ -185,22 +278,17 @@ def _shown(name: str) -> str:
     return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
 
 
-def _owner(name: str) -> re.Match[str] | None:
-    return MOODLE.fullmatch(name) or CANVAS.fullmatch(name)
-
-
 def _written(date: datetime) -> str:
     """Return a local time as text that nbgrader reads."""
     return f"{date.astimezone(UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-def _read_sets(assignments: Path) -> dict[str, set[str]]:
-    """Return the grade_ids of the cells of each set."""
-    sets = defaultdict[str, set[str]](set)
+def _read_sets(assignments: Path) -> dict[str, list[NotebookNode]]:
+    """Return the notebooks of each set: a private set can have other cells."""
+    sets = defaultdict[str, list[NotebookNode]](list)
     for path in sorted(assignments.glob("*/*/*.ipynb")):
         if path.parts[-3] in ("source", "private", "release") and path.stem == path.parent.name:
-            cells = read_notebook(path.read_bytes(), str(path)).cells
-            sets[path.stem] |= {grade_id(cell) for cell in cells} - {""}
+            sets[path.stem].append(nbformat.read(path, as_version=4))
     if not sets:
         raise ValueError(f"{assignments} has no problem sets in source/")
     return sets
@@ -222,10 +310,12 @@ def _read_roster(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _match(upload: Upload, sets: dict[str, set[str]]) -> tuple[str, str]:
+def _match(
+    file: File, about: dict[str, str], sets: dict[str, list[NotebookNode]]
+) -> tuple[str, str]:
     """Return the set that fits a notebook's cells, and a reason if the notebook is not used."""
-    cells, stem = read_notebook(upload.content, "it").cells, Path(upload.about["file"]).stem
-    shared = {name: len({grade_id(cell) for cell in cells} & own) for name, own in sets.items()}
+    notebook, stem = read_notebook(file.content, "it"), Path(about["file"]).stem
+    shared = {name: max(count_found(notebook, one) for one in own) for name, own in sets.items()}
     named = [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", stem, re.IGNORECASE)]
     best = max(sets, key=lambda name: (shared[name], name in named))
     if not shared[best]:
@@ -242,8 +332,9 @@ def _plain(name: str) -> str:
 
 def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
     """Return a student's id in the roster, or an id made from the name."""
-    canvas, plain, number = "number" in about, _plain(about["name"]), _plain(about["id"])
+    canvas, plain, number = bool(about["number"]), _plain(about["name"]), _plain(about["id"])
     found = [r["id"] for r in roster if canvas and r.get("lms_user_id") == about["id"]]
+    found = found or [r["id"] for r in roster if r["id"] == about["name"]]
     key: Any = "".join if canvas else sorted  # Canvas writes names without spaces, last name first
     for row in roster if plain and not found else ():
         words = _plain(f"{row.get('last_name', '')} {row.get('first_name', '')}")
@@ -258,17 +349,15 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
 def _take(best: Upload, place: Path) -> Row:
     """Write an upload to its folder, unless a newer file is there; return a row for the report."""
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
-    text = decode(best.content).encode()
-    note = "; it is now stored in UTF-8" * (text != best.content)
-    why = f"{place.parent.name}, {place.name}{note}"
+    why = f"{place.parent.name}, {place.name}"
     if target.exists():
         # keep a file without a stamp, because it was not collected
         old = stamp.read_text(encoding="utf-8").strip() if stamp.exists() else "later"
-        if target.read_bytes() == text or best.date == old:
+        if target.read_bytes() == best.content or best.date == old:
             return "unchanged", best.file, why
         if best.date < old:
             return "duplicates", best.file, f"{why}: the file collected before is newer"
         why += ": it replaces the file collected before"
-    write_whole(target, text)
+    write_whole(target, best.content)
     write_whole(stamp, f"{best.date}\n".encode())
     return "collected", best.file, why

@@ -29,8 +29,9 @@ from traitlets.config import Config
 from rbclassroom.assignments import locked_cells, sandbox
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.handout import find_set, read_config
-from rbclassroom.assignments.locked_cells import Refused, grade_id, is_answer
+from rbclassroom.assignments.locked_cells import grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
+from rbclassroom.assignments.submissions import Refused, read_notebook
 from rbclassroom.assignments.tables import update
 from rbcourse.files import replace_file
 
@@ -184,10 +185,11 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
         what, student = row["what"], row["what"].removesuffix(f", {name}")
         if row["list"] == "missing" and student != what and student not in students:
             yield student, "no file was collected"
-        elif row["list"] in ("refused", "unmatched"):
-            named = {each for each in sets if each in what.casefold()}
+        elif row["list"] in ("refused", "unmatched", "nothing usable"):
+            named = {each for each in sets if each in f"{what} {row['why']}".casefold()}
             if name in named or not named:
-                yield what, f"not collected: {row['why']}"
+                usable = "nothing usable: " * (row["list"] == "nothing usable")
+                yield what, f"not collected: {usable}{row['why']}"
 
 
 def _perhaps_late(assignments: Path) -> set[str]:
@@ -326,10 +328,7 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
         raise Refused(f"the folder has more files than {wanted}: remove {', '.join(others)}")
     if path.stat().st_size > LARGEST:
         raise Refused(f"{wanted} has more than {LARGEST:,} bytes")
-    content = path.read_bytes()
-    locked_cells.read_notebook(content, wanted)
-    if content.startswith((b"\xff\xfe", b"\xfe\xff", b"\xef\xbb\xbf")):
-        raise Refused(f"{wanted} is not in plain UTF-8; collect it again, or save it in Jupyter")
+    read_notebook(path.read_bytes(), wanted)
 
 
 def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[str]]) -> Row:

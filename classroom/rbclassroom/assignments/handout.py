@@ -116,7 +116,7 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
     required = [*pins, *(f"./{wheel}" for wheel in wheels)]
     readme = Path(__file__).with_suffix(".txt").read_text("ascii")
     own = {
-        f"original/{name}.ipynb": files[f"{name}.ipynb"],
+        **{f"original/{path}": data for path, data in files.items()},
         "requirements.txt": "".join(f"{line}\n" for line in required).encode(),
         "README.txt": readme.format(name=name).replace("\n", "\r\n").encode("ascii"),
         **wheels,

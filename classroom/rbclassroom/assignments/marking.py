@@ -110,7 +110,7 @@ class Problem:
         if numbers.shape != wanted.shape:
             return f"{called} the shape {wanted.shape} is wanted; yours is {numbers.shape}."
         if not np.isfinite(numbers).all():
-            why = "Do you divide by 0?"
+            why = "Does it divide by 0, or take a root or an arccos of a number without one?"
             return f"{called} your result is not finite: {show(numbers)}. {why}"
         text = f"{called} the result should be {show(wanted)}; yours is {show(numbers)}"
         return f"{text}, off by {np.abs(numbers - wanted).max(initial=0):.1g}."

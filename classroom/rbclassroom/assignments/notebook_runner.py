@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from nbclient import NotebookClient
+from nbclient.exceptions import DeadKernelError
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from traitlets import Integer
@@ -61,6 +62,9 @@ class BoundedClient(NotebookClient):
         if cell_index != self._at:
             self._at, self.raise_on_iopub_timeout, self._room = cell_index, False, dict(ROOM)
         kind, content = msg["msg_type"], msg["content"]
+        if kind == "error" and content["ename"] == "StdinNotImplementedError":
+            why = "nobody can answer input() here; write the value into the code"
+            content |= {"ename": "EOFError", "evalue": why, "traceback": [why]}
         if kind == "error":
             content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
             content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
@@ -86,8 +90,13 @@ class BoundedClient(NotebookClient):
         """
 
     def on_cell_executed(self, cell: NotebookNode, cell_index: int, execute_reply: Any) -> None:
-        """Store the error that the reply names; otherwise a failed test could seem to pass."""
+        """Store the error that the reply names; otherwise a failed test could seem to pass.
+
+        Raise DeadKernelError if the cell calls exit(), which ends the kernel a little later.
+        """
         reply = execute_reply["content"]
+        if any(request.get("source") == "ask_exit" for request in reply.get("payload", [])):
+            raise DeadKernelError("the cell calls exit()")
         if reply["status"] != "ok":
             cell.outputs = [out for out in cell.outputs if out.output_type != "execute_result"]
             empty = {"ename": "Error", "evalue": "the cell was not run", "traceback": []}

@@ -1,6 +1,7 @@
 """Read the problems of a set from the file ``NAME.json`` beside its notebook."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +13,30 @@ from rbclassroom.assignments.student_code import NotYet
 
 
 def problem(name: str, slug: str) -> Problem | Sampler:
-    """Return the problem `slug` of the set `name`, whose folder must be the current folder.
+    """Return the problem `slug` of the set `name`, in whose folder the kernel was started.
 
     If the table of the set is beside the folder, as in the course, the data are updated first.
     """
-    if Path("..", f"{name}.toml").is_file():
+    folder = _start()
+    if (folder.parent / f"{name}.toml").is_file():
         from rbclassroom.assignments.tables import update
 
-        update(Path.cwd())
-    file = Path(f"{name}.json")
-    if not file.is_file():
-        raise NotYet(f"{file} is missing. Copy it from the handout into this folder.")
+        update(folder)
+    files = [place / f"{name}.json" for place in (folder, Path.cwd())]
+    file = next((file for file in files if file.is_file()), None)
+    if not file:
+        raise NotYet(f"{name}.json is missing. Copy it from the handout into this folder.")
     data = json.loads(file.read_text("utf-8"), object_hook=_as_array)[slug]
     data["mistakes"] = [Mistake(**mistake) for mistake in data["mistakes"]]
     if law := data.pop("law", None):
         return Sampler(**LAWS[law], **data)
     return (Drawing if data.pop("drawing") else Problem)(**data)
+
+
+def _start() -> Path:
+    """Return the folder in which the kernel was started; the code of a student may leave it."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    return Path(shell.starting_dir) if shell else Path.cwd()
 
 
 def _as_array(found: dict[str, Any]) -> Any:

@@ -25,8 +25,8 @@ from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.grade import grade, grade_one
 from rbclassroom.assignments.handout import read_config
-from rbclassroom.assignments.locked_cells import Refused
 from rbclassroom.assignments.safe_files import write_csv
+from rbclassroom.assignments.submissions import Refused
 
 ROOT = Path(__file__).parents[3]
 HIDDEN = ["square(-3)==9", "isclose(half,0.5)", "Likesigns"]
@@ -89,12 +89,18 @@ SQUARE, HALF = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tin
 # Each row has a student, a change, answers, points (none if refused), and parts of the remarks.
 CLASS = [
     ("good one", None, {"square": WARNS}, "2 1", []),
-    ("tampers", tamper, {"half": "half = 3"}, "2 0", ["cell 2, answer", "the same name", "more"]),
+    (
+        "tampers",
+        tamper,
+        {"half": "half = 3"},
+        "2 0",
+        ["is an earlier copy; the last one counts", "more"],
+    ),
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),
     ("nosy", None, {"square": NOSY}, "0 1", []),
     ("dies", None, {"half": DIES}, " ", [f"Python ended in or before {HALF}, or 600 s were over"]),
-    ("stripped", strip_metadata, {}, " ", ["the cells are not those of this problem set"]),
+    ("stripped", strip_metadata, {}, "2 1", ["8 cells have lost the marks of nbgrader"]),
 ]
 FILES = [
     ("pdf", "ps0.ipynb", b"%PDF-1.7 \xff", "ps0.ipynb is a PDF or an archive, not a notebook"),

@@ -41,7 +41,8 @@ def test_the_handout_has_all_files_that_a_student_needs(course, unpacked):
     names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*.*")}
     wheels = sorted(path.name for path in unpacked.glob("*.whl"))
     assert [name.partition("-")[0] for name in wheels] == ["rbcourse", "rbcourse_classroom"]
-    own = {"ps0.ipynb", "original/ps0.ipynb", "requirements.txt", "README.txt", "table.csv"}
+    given = {"ps0.ipynb", "table.csv"}
+    own = {"requirements.txt", "README.txt", *given, *(f"original/{name}" for name in given)}
     assert names == {*own, *wheels}
     original = (unpacked / "original" / "ps0.ipynb").read_bytes()
     assert (unpacked / "ps0.ipynb").read_bytes() == original
@@ -90,7 +91,7 @@ def test_a_private_set_replaces_the_public_one(tmp_path):
         (6, {"source": "Mark scheme: a point"}, "ps0.ipynb gives away 'Mark scheme'"),
         (2, {"source": "### BEGIN SOLUTION"}, "be released: no end solution statement found"),
         (7, {"attachments": {"a.png": {"image/png": "AA=="}}}, "an answer has an attachment"),
-        (2, {"metadata": {"note": "it is def square(x):"}}, r"gives away 'def square\(x\):'"),
+        (2, {"metadata": {"note": "it is return x * x"}}, r"gives away 'return x \* x'"),
     ],
 )
 def test_sets_that_reveal_solutions_or_hidden_tests_are_refused(tmp_path, at, change, message):

@@ -163,7 +163,7 @@ SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
 OTHERS = [
     ("tells", "half = 0.5", "2 1", ""),
     ("writes words", "half = 0.5", "2 1", ""),
-    ("forges remarks", "half = 0.5", "2 1", "cell 1, locked cell of “A tiny set” was changed; it"),
+    ("forges remarks", "half = 0.5", "2 1", "cell 2, locked cell of “A tiny set” was changed; it"),
     ("raises", "half = 0.5", "0 1", ""),
     ("=cmd|' -C calc'!A0", "half = 1\n100.0", "2 0", ""),  # returns points
     ("loops", f"{begun()}\nwhile True: pass", "2 0", f"{CELL_5}: stopped after"),
@@ -173,12 +173,11 @@ OTHERS = [
     ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
     ("[ab]*", "half = 0.5", " ", "the name of the folder contains [, * or ?; rename the folder"),
 ]
-NOT_UTF8 = "ps0.ipynb is not in plain UTF-8; collect it"
 DAMAGED = "ps0.ipynb is damaged or not a notebook"
 FILES = [
     ("crlf", lambda good: good.replace(b"\n", b"\r\n"), "2 1", ""),
-    ("bom", lambda good: codecs.BOM_UTF8 + good, " ", NOT_UTF8),
-    ("utf-16", lambda good: good.decode().encode("utf-16"), " ", NOT_UTF8),
+    ("bom", lambda good: codecs.BOM_UTF8 + good, "2 1", ""),
+    ("utf-16", lambda good: good.decode().encode("utf-16"), "2 1", ""),
     ("half a file", lambda good: good[:999], " ", DAMAGED),
     ("deep", lambda good: b'{"cells": ' + b"[" * 10**5, " ", DAMAGED),
     ("long", lambda good: b" " * 31_000_000, " ", "ps0.ipynb has more than 30,000,000 bytes"),

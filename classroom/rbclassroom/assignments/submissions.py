@@ -1,0 +1,301 @@
+"""Read a student's notebook, whatever program wrote it, and restore the problem set in it.
+
+`read_notebook` makes a clean notebook from the types, texts and marks of the cells. `restore` finds
+the cells of the set: by nbgrader's marks, by their ids, by their texts, and answers also by the
+functions that they define or by their place. Then it restores the locked cells. A text of the
+student in a locked cell gets a cell of its own. The check and the grading use these functions.
+"""
+
+import copy
+import json
+import re
+from collections import defaultdict
+from typing import Any
+
+from nbformat import NotebookNode
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
+
+from rbclassroom.assignments.locked_cells import grade_id, is_answer, marks_of, name_cell
+
+MANY = 3  # more cells with the same change get one remark
+ELSEWHERE = "# This answer is in another cell."
+MAKE: dict[str, Any] = {"code": new_code_cell, "markdown": new_markdown_cell, "raw": new_raw_cell}
+
+
+class Refused(ValueError):
+    """A submission cannot be graded automatically; the message gives the reason."""
+
+
+def read_notebook(content: bytes, name: str) -> NotebookNode:
+    """Return the cells in a file as a clean notebook; raise `Refused` if the file has none.
+
+    The file may have any version of the notebook format and any encoding of JSON. Outputs and
+    unknown fields are left out. A half of a surrogate pair becomes "?".
+    """
+    if not content.strip():
+        raise Refused(f"{name} is empty; open it in JupyterLab and save it, or start again")
+    if content.startswith((b"%PDF", b"PK")):
+        raise Refused(f"{name} is a PDF or an archive, not a notebook; hand in the notebook")
+    try:
+        try:
+            found = json.loads(content, strict=False)
+        except UnicodeDecodeError:  # some editors of Windows do not save in UTF-8
+            found = json.loads(content.decode("cp1252", "replace"), strict=False)
+        sheets = found.get("worksheets") or [found]  # versions 2 and 3 have worksheets
+        cells = [_clean(raw) for sheet in sheets for raw in sheet["cells"]]
+        if not cells:
+            raise ValueError("it has no cells")
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError) as error:
+        raise _damaged(name, f"{type(error).__name__}: {error}") from error
+    except ValueError as error:
+        raise _damaged(name, str(error)) from error
+    for at, cell in enumerate(cells):
+        cell.id = f"read-{at}"
+    return new_notebook(cells=cells)
+
+
+def _damaged(name: str, why: str) -> Refused:
+    cure = "take an earlier copy, or open it in JupyterLab and save it again"
+    return Refused(f"{name} is damaged or not a notebook ({why[:80]}); {cure}")
+
+
+def _clean(raw: dict[str, Any]) -> NotebookNode:
+    kind = raw.get("cell_type") or ("code" if "outputs" in raw else "markdown")
+    text = raw.get("source", raw.get("input", ""))  # version 3 has "input"
+    if isinstance(text, list):  # some programs leave out the ends of the lines
+        text = ("" if any("\n" in line for line in text) else "\n").join(text)
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    if kind == "heading":  # in version 3
+        text = f"{'#' * raw['level']} {text}"
+    cell = MAKE.get(kind, new_markdown_cell)(text.encode("utf-8", "replace").decode())
+    about, attached = raw.get("metadata") or {}, raw.get("attachments") or {}
+    # Colab writes the id into the metadata
+    cell.metadata.ids = [str(each["id"]) for each in (raw, about) if "id" in each]
+    cell.metadata.damaged = text != cell.source
+    if isinstance(about.get("nbgrader"), dict):
+        cell.metadata.nbgrader = NotebookNode(about["nbgrader"])
+    if attached and cell.cell_type == "markdown":
+        cell.attachments = NotebookNode(attached)
+    return cell
+
+
+def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
+    """Restore the cells of a set in a student's notebook, and return remarks on the changes.
+
+    Answers keep their texts, and all cells keep the student's order. Raise `Refused` if less than
+    half of a set without marks is there, or if most cells belong to another set.
+    """
+    work = _Restoring(notebook.cells, original)
+    foreign = work.find()
+    found, size = len({*work.names()} & work.wanted.keys()), len(work.wanted)
+    if found <= foreign or (work.unmarked and 2 * found < size):
+        cure = "copy your answers into a new copy of the notebook that was handed out"
+        raise Refused(f"only {found} of the {size} cells are those of this problem set; {cure}")
+    for step in (work.join_copies, work.put_back, work.complete):
+        for name in work.wanted:
+            step(name)
+    return work.finish()
+
+
+def count_found(notebook: NotebookNode, original: NotebookNode) -> int:
+    """Return how many cells of a set are found in a notebook by mark, id or text."""
+    work = _Restoring(copy.deepcopy(notebook.cells), original)
+    work.find()
+    return len({*work.names()} & work.wanted.keys())
+
+
+def _core(text: str) -> str:
+    """Return a text without white space; editors change white space."""
+    return "".join(text.split())
+
+
+def _around(text: str, locked: str) -> list[str]:
+    """Return the parts of a text before and after a locked text, or [] if it is not there."""
+    lines, wanted = (
+        [line.rstrip() for line in each.split("\n")] for each in (text, locked.strip())
+    )
+    for at in range(len(lines)):
+        if any(wanted) and lines[at : at + len(wanted)] == wanted:
+            return ["\n".join(part).strip("\n") for part in (lines[:at], lines[at + len(wanted) :])]
+    return []
+
+
+def _lines(cell: NotebookNode) -> set[str]:
+    return {line.strip() for line in cell.source.split("\n")} - {""}
+
+
+def _heads(cell: NotebookNode) -> list[str]:
+    """Return the beginnings of the functions and classes that a cell defines."""
+    return re.findall(r"^(?:def|class) +\w+", cell.source, re.MULTILINE)
+
+
+def _fill(target: NotebookNode, cells: list[NotebookNode], gap: str = "\n\n") -> None:
+    """Give the texts and the pictures of some cells to a cell."""
+    target.source = gap.join(cell.source for cell in cells)
+    target.metadata.damaged = any(cell.metadata.get("damaged") for cell in cells)
+    attached = [cell.attachments for cell in cells if "attachments" in cell]
+    if attached and target.cell_type == "markdown":
+        target.attachments = NotebookNode({k: v for each in attached for k, v in each.items()})
+
+
+class _Restoring:
+    """A student's cells; during the restoration those of the set have their names as marks."""
+
+    def __init__(self, cells: list[NotebookNode], original: NotebookNode) -> None:
+        self.cells = cells
+        self.wanted = {grade_id(cell): cell for cell in original.cells if grade_id(cell)}
+        self.changes = list[tuple[str, str]]()  # the name or the id of a cell, and its change
+        self.unmarked = 0  # the number of cells that have lost their marks
+
+    def names(self) -> list[str]:
+        return [grade_id(cell) for cell in self.cells]
+
+    def place(self, cell: NotebookNode) -> int:
+        return next(at for at, each in enumerate(self.cells) if each is cell)
+
+    def is_empty(self, cell: NotebookNode) -> bool:
+        """Tell whether a cell of the set has no other text than the original."""
+        return _core(cell.source) in ("", _core(self.wanted[grade_id(cell)].source))
+
+    def find(self) -> int:
+        """Name the cells of the set by mark, id or text; return the number of other names."""
+        foreign = {*self.names()} - self.wanted.keys() - {""}
+        ids = {given.id: [name] for name, given in self.wanted.items()}
+        texts = defaultdict[str, list[str]](list)
+        for name, given in self.wanted.items():
+            texts[_core(given.source)].append(name)
+        by_id = [(cell, ids.get(own, [])) for cell in self.cells for own in cell.metadata.ids]
+        by_text = [(cell, texts.get(_core(cell.source), [])) for cell in self.cells]
+        for cell, names in by_id + by_text:
+            new = [name for name in names if name not in self.names()]
+            if new and not grade_id(cell):
+                cell.metadata.nbgrader = NotebookNode(grade_id=new[0])
+                self.unmarked += 1
+        for cell in self.cells:
+            if grade_id(cell) in foreign:
+                cell.metadata.nbgrader = NotebookNode()
+        return len(foreign)
+
+    def join_copies(self, name: str) -> None:
+        """Let one cell have each name: a split cell is joined, and of copies the last one counts.
+
+        Copies without a text of the student are left out, and the others become added cells.
+        """
+        copies = [cell for cell in self.cells if grade_id(cell) == name]
+        if len(copies) < 2:
+            return
+        filled, heads = [c for c in copies if not self.is_empty(c)], _heads(self.wanted[name])
+        best = (filled or copies)[-1]
+        near = self.place(copies[-1]) - self.place(copies[0]) < len(copies)
+        if len(filled) > 1 and near and not any({*_heads(c)} & {*heads} for c in filled[1:]):
+            _fill(best, filled, "\n")
+            self.changes.append((name, "was split; its parts are joined"))
+            filled = [best]
+        for cell in copies:
+            if cell is best:
+                continue
+            if cell in filled:
+                cell.metadata.nbgrader = NotebookNode()
+                self.changes.append((cell.id, "is an earlier copy; the last one counts"))
+            else:
+                del self.cells[self.place(cell)]
+
+    def put_back(self, name: str) -> None:
+        """Restore a cell that is there; the student's text in a locked cell becomes added cells."""
+        if name not in self.names():
+            return
+        cell, given = self.cells[self.names().index(name)], self.wanted[name]
+        kept, before, after = copy.deepcopy(given), "", ""
+        if is_answer(given):
+            _fill(kept, [cell])
+        elif not self.is_empty(cell) and not _lines(cell) <= _lines(given):
+            before, after = _around(cell.source, given.source) or (cell.source, "")
+        own, marks = ({**marks_of(each), "cell_type": ""} for each in (cell, given))
+        changes = {
+            "was changed": not is_answer(given) and _core(cell.source) != _core(given.source),
+            f"was made a {cell.cell_type} cell": cell.cell_type != given.cell_type,
+            "has other points or marks": len(own) > 2 and own != marks,
+        }
+        at, make = self.place(cell), MAKE[cell.cell_type]
+        self.cells[at : at + 1] = [
+            *([make(before)] if before else []),
+            kept,
+            *([make(after)] if after else []),
+        ]
+        if what := " and ".join(change for change, made in changes.items() if made):
+            saved = ", and its other text is in an added cell" * bool(before or after)
+            self.changes.append((name, f"{what}; it is restored{saved}"))
+
+    def complete(self, name: str) -> None:
+        """Insert a cell that is missing; find the text of an answer that is missing or empty."""
+        given, there = self.wanted[name], name in self.names()
+        old = self.cells[self.names().index(name)] if there else None
+        if old and not (is_answer(given) and self.is_empty(old)):
+            return
+        if not is_answer(given):
+            self.cut_out(given.source)
+        new, names, order = copy.deepcopy(given), self.names(), list(self.wanted)
+        before, after = order[: order.index(name)][-1:], order[order.index(name) + 1 :][:1]
+        above = names.index(before[0]) if before else -1
+        below = next((k for k in range(above + 1, len(names)) if names[k] not in ("", name)), None)
+        gap = self.cells[above + 1 : below]
+        found = self.search(given, gap) if is_answer(given) else []
+        if found:
+            _fill(new, found)
+            self.changes.append((name, "has the text of an added cell"))
+        elif any({*_heads(cell)} & {*_heads(given)} for cell in self.cells if cell is not old):
+            new.source = ELSEWHERE
+            self.changes.append((name, "is empty; another cell has its function"))
+        elif not old:
+            self.changes.append((name, "was missing; it is restored"))
+        if found and any(found[-1] is cell for cell in gap):
+            place = self.place(found[-1])
+        elif old:
+            place = self.place(old)
+        elif before and below and names[below : below + 1] == after and not is_answer(given):
+            place = below
+        else:
+            place = above + 1
+        self.cells.insert(place, new)
+        for cell in [*found, *([old] if old else [])]:
+            del self.cells[self.place(cell)]
+
+    def cut_out(self, locked: str) -> None:
+        """Remove a locked text from the answers and the added cells, with which it was merged."""
+        for cell in self.cells:
+            parts = _around(cell.source, locked)
+            if parts and (is_answer(cell) or not grade_id(cell)):
+                cell.source = "\n\n".join(filter(None, parts))
+
+    def search(self, given: NotebookNode, gap: list[NotebookNode]) -> list[NotebookNode]:
+        """Return the added cells that make up an answer, whose place is in `gap`."""
+        own = [cell for cell in self.cells if not grade_id(cell) and cell.source.strip()]
+        near = [cell for cell in own if any(cell is each for each in gap)]
+        if not _heads(given):
+            return [cell for cell in near if cell.cell_type == given.cell_type]
+        fits = [[c for c in cells if {*_heads(c)} & {*_heads(given)}] for cells in (own, near)]
+        return (fits[1] or fits[0])[-1:]
+
+    def finish(self) -> list[str]:
+        """Set the metadata of added cells, and return the remarks."""
+        lost = f"{self.unmarked} cells have lost the marks of nbgrader; ids and texts identify them"
+        remarks, grouped = [lost] * bool(self.unmarked), defaultdict[str, list[int]](list)
+        for cell in self.cells:
+            if cell.metadata.pop("damaged", False):
+                why = "has a damaged letter, which is replaced by “?”"
+                self.changes.append((grade_id(cell) or cell.id, why))
+        for name, what in self.changes:
+            same = (at for at, each in enumerate(self.cells) if name in (grade_id(each), each.id))
+            grouped[what] += [*same][:1]  # an added cell can have become a part of an answer
+        for what, places in grouped.items():
+            numbers = ", ".join(str(at + 1) for at in sorted(places))
+            if len(places) > MANY:
+                remarks.append(f"cells {numbers}: each {what}")
+            else:
+                remarks += [f"{name_cell(self.cells, at)} {what}" for at in places]
+        if [*filter(None, self.names())] != list(self.wanted):
+            remarks.append("cells are not in the order of the original; they are run in your order")
+        for at, cell in enumerate(self.cells):
+            if not grade_id(cell):
+                cell.id, cell.metadata = f"added-{at}", NotebookNode()
+        return remarks

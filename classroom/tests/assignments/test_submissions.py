@@ -1,0 +1,500 @@
+"""A student's work is found in a notebook, whatever program or accident changed the file."""
+
+import copy
+import json
+import re
+
+import nbformat
+import numpy as np
+import pytest
+from tiny_set import ANSWERS, answered, cell, write_tiny_set
+
+from rbclassroom.assignments import handout
+from rbclassroom.assignments.locked_cells import grade_id
+from rbclassroom.assignments.submissions import Refused, count_found, read_notebook, restore
+
+TITLE, IMPORTS, SQUARE, SQUARE_TEST, HALF, HALF_TEST, QUESTION, WORDS = range(8)
+STUB = "# YOUR CODE HERE\nraise NotImplementedError()"
+GOOD = {**ANSWERS, "words-answer": "It is: 2 × 2 > 0."}
+
+
+@pytest.fixture(scope="module")
+def release(tmp_path_factory):
+    """Return the tiny set as it is handed out."""
+    folder = tmp_path_factory.mktemp("assignments")
+    write_tiny_set(folder)
+    return handout.release("ps0", folder)["ps0.ipynb"].decode()
+
+
+def markdown(source, **fields):
+    return {"cell_type": "markdown", "id": "own", "metadata": {}, "source": source, **fields}
+
+
+def code(source, **fields):
+    fields = {"outputs": [], "execution_count": None, **fields}
+    return {"cell_type": "code", "id": "own", "metadata": {}, "source": source, **fields}
+
+
+def of_every_cell(change):
+    """Return a change of a notebook that changes each cell."""
+
+    def changed(notebook):
+        for at, each in enumerate(notebook["cells"]):
+            change(each, at)
+
+    return changed
+
+
+def without_marks(each, at=0):
+    each["metadata"] = {}
+
+
+def without_ids(each, at=0):
+    each.pop("id")
+
+
+def without_marks_and_ids(each, at=0):
+    each["metadata"] = {}
+    each.pop("id")
+
+
+def code_without_marks(each, at):
+    if each["cell_type"] == "code":
+        each["metadata"] = {}
+
+
+def from_colab(each, at):
+    each["metadata"] = {"id": each.pop("id"), "cellView": "form", "outputId": "5f-1"}
+
+
+def from_deepnote(each, at):
+    each["metadata"] = {"cell_id": f"0{at}-abc", "deepnote_cell_type": each["cell_type"]}
+    each |= {"id": f"{at:032x}", "block_group": "x"}
+
+
+def from_nteract(each, at):
+    each["metadata"] |= {"inputHidden": False, "outputHidden": True}
+    each["outputExpanded"] = False
+
+
+def from_kaggle(each, at):
+    each["metadata"] |= {"_uuid": "8f2839f25d086af736a60e9eeb907d3b93b6e0e5", "trusted": True}
+
+
+def as_version_3(notebook):
+    cells = notebook.pop("cells")
+    for each in cells:
+        each.pop("id")
+        if each["cell_type"] == "code":
+            each |= {"input": each.pop("source"), "language": "python", "collapsed": False}
+            each["prompt_number"] = each.pop("execution_count")
+    cells[TITLE] |= {"cell_type": "heading", "level": 1, "source": ["A tiny set"]}
+    notebook |= {"nbformat": 3, "nbformat_minor": 0, "worksheets": [{"cells": cells}]}
+
+
+def as_version_5(notebook):
+    notebook |= {"nbformat": 5, "nbformat_minor": 0, "language": "python"}
+
+
+def without_fields(each, at):
+    for key in ("outputs", "execution_count"):
+        each.pop(key, None)
+
+
+def without_types(each, at):
+    del each["cell_type"]
+
+
+def with_odd_outputs(each, at):
+    if each["cell_type"] == "code":
+        image = {"output_type": "display_data", "data": {"image/png": ["iVBO", "Rw"], "x": {}}}
+        each |= {"outputs": [image, {"output_type": "pyout"}, None], "execution_count": "7"}
+
+
+def with_odd_metadata(notebook):
+    notebook["metadata"] = {"kernelspec": {"name": 3}, "widgets": None}
+    notebook["signature"] = "abc"
+
+
+def with_odd_ids(each, at):
+    each["id"] = "a b/ü" * 30 + str(at % 2)
+
+
+def as_one_line(each, at):
+    each["source"] = "".join(each["source"])
+
+
+def as_lines_without_ends(each, at):
+    each["source"] = "".join(each["source"]).split("\n")
+
+
+def with_crlf(each, at):
+    each["source"] = [line.replace("\n", "\r\n") for line in each["source"]]
+
+
+def with_spaces(each, at):
+    each["source"] = [line.replace("\n", "  \n") for line in each["source"]] + ["\n"]
+
+
+def unlocked(each, at):
+    each["metadata"] |= {"editable": True, "deletable": True}
+
+
+def text(each):
+    return "".join(each["source"])
+
+
+def merged(one, two):
+    """Return a change that merges a cell with the next, with the marks of one of them."""
+
+    def change(notebook):
+        above, below = notebook["cells"][one : one + 2]
+        source = f"{text(above)}\n\n{text(below)}"
+        notebook["cells"][one : one + 2] = [{**(above, below)[two], "source": source}]
+
+    return change
+
+
+def split(at, where):
+    """Return a change that splits a cell behind a text; JupyterLab gives both parts its marks."""
+
+    def change(notebook):
+        whole, source = notebook["cells"][at], text(notebook["cells"][at])
+        middle = source.index(where) + len(where)
+        parts = [{**copy.deepcopy(whole), "source": s} for s in (source[:middle], source[middle:])]
+        parts[1]["id"] = "new"
+        notebook["cells"][at : at + 1] = parts
+
+    return change
+
+
+def removed(*places):
+    def change(notebook):
+        notebook["cells"] = [c for at, c in enumerate(notebook["cells"]) if at not in places]
+
+    return change
+
+
+def in_added_cell(at, place, stub=STUB, keep=True):
+    """Return a change that writes an answer into an added cell, and leaves or deletes its own."""
+
+    def change(notebook):
+        given = notebook["cells"][at]
+        added = (code if given["cell_type"] == "code" else markdown)(given["source"])
+        given["source"] = stub
+        if not keep:
+            notebook["cells"].remove(given)
+        notebook["cells"].insert(place, added)
+
+    return change
+
+
+def in_order(*changes):
+    def change(notebook):
+        for each in changes:
+            each(notebook)
+
+    return change
+
+
+def in_question(notebook):
+    question, answer = notebook["cells"][QUESTION], notebook["cells"][WORDS]
+    question["source"] = f"{text(question)}\n\n{text(answer)}"
+    answer["source"] = "YOUR ANSWER HERE"
+
+
+def copied(at, place, source=None):
+    def change(notebook):
+        twin = {**copy.deepcopy(notebook["cells"][at]), "id": "twin"}
+        notebook["cells"].insert(place, {**twin, "source": source or twin["source"]})
+
+    return change
+
+
+def made(kind, *places):
+    def change(notebook):
+        for at in places:
+            each = notebook["cells"][at]
+            notebook["cells"][at] = {**each, "cell_type": kind}
+
+    return change
+
+
+def marked(**marks):
+    def change(notebook):
+        notebook["cells"][SQUARE_TEST]["metadata"]["nbgrader"] |= marks
+
+    return change
+
+
+def moved(notebook):
+    notebook["cells"].append(notebook["cells"].pop(HALF))
+
+
+SQUARE_STUB = "def square(x):\n    # YOUR CODE HERE\n    raise NotImplementedError()"
+LOST = "8 cells have lost the marks"
+ADDED = "has the text of an added cell"
+CHANGED = "was changed; it is restored"
+# The changes that a human reader overlooks: each answer is found. A row has a change, the number
+# of added cells that stay, and parts of the remarks.
+FOUND = {
+    "code cells without metadata": (of_every_cell(code_without_marks), 0, ["5 cells have lost"]),
+    "no metadata": (of_every_cell(without_marks), 0, [LOST]),
+    "no ids": (of_every_cell(without_ids), 0, []),
+    "no metadata and no ids": (of_every_cell(without_marks_and_ids), 0, ["5 cells", *[ADDED] * 3]),
+    "Colab": (of_every_cell(from_colab), 0, [LOST]),
+    "Deepnote": (of_every_cell(from_deepnote), 0, ["5 cells", *[ADDED] * 3]),
+    "nteract": (of_every_cell(from_nteract), 0, []),
+    "Kaggle": (of_every_cell(from_kaggle), 0, []),
+    "version 3": (as_version_3, 0, []),
+    "version 5": (as_version_5, 0, []),
+    "no outputs": (of_every_cell(without_fields), 0, []),
+    "no types": (of_every_cell(without_types), 0, []),
+    "odd outputs": (of_every_cell(with_odd_outputs), 0, []),
+    "odd metadata": (with_odd_metadata, 0, []),
+    "odd ids": (of_every_cell(with_odd_ids), 0, []),
+    "sources as one line": (of_every_cell(as_one_line), 0, []),
+    "lines without ends": (of_every_cell(as_lines_without_ends), 0, []),
+    "ends of lines of Windows": (of_every_cell(with_crlf), 0, []),
+    "spaces": (of_every_cell(with_spaces), 0, []),
+    "unlocked": (of_every_cell(unlocked), 0, []),
+    "answer merged into its test": (merged(SQUARE, 1), 0, [CHANGED, ADDED]),
+    "test merged into its answer": (merged(SQUARE, 0), 0, ["was missing"]),
+    "answer merged into the test above": (merged(SQUARE_TEST, 0), 0, [CHANGED, ADDED]),
+    "test merged into the answer below": (merged(SQUARE_TEST, 1), 0, ["was missing"]),
+    "words merged into the question": (merged(QUESTION, 0), 0, [CHANGED, ADDED]),
+    "question merged into the words": (merged(QUESTION, 1), 0, ["was missing"]),
+    "words in the question": (in_question, 0, [CHANGED, ADDED]),
+    "split function": (split(SQUARE, "(x):\n"), 0, ["was split"]),
+    "split words": (split(WORDS, "It is: "), 0, ["was split"]),
+    "split test": (split(SQUARE_TEST, "square(2)"), 0, ["was split"]),
+    "copied stub": (copied(SQUARE, SQUARE + 1, SQUARE_STUB), 0, []),
+    "copied test": (copied(SQUARE_TEST, SQUARE_TEST), 0, []),
+    "earlier copy": (copied(SQUARE, SQUARE, "def square(x): x + x"), 1, ["is an earlier copy"]),
+    "function in an added cell below": (in_added_cell(SQUARE, SQUARE + 1, SQUARE_STUB), 0, [ADDED]),
+    "function in an added cell above": (in_added_cell(SQUARE, SQUARE, SQUARE_STUB), 0, [ADDED]),
+    "function in the last cell": (in_added_cell(SQUARE, 8, SQUARE_STUB), 0, [ADDED]),
+    "number in an added cell": (in_added_cell(HALF, HALF + 1), 0, [ADDED]),
+    "words in an added cell": (in_added_cell(WORDS, 8, "YOUR ANSWER HERE"), 0, [ADDED]),
+    "answer cells deleted": (
+        in_order(in_added_cell(SQUARE, SQUARE, keep=False), in_added_cell(HALF, HALF, keep=False)),
+        0,
+        [ADDED] * 2,
+    ),
+    "no tests": (removed(SQUARE_TEST, HALF_TEST), 0, ["was missing"] * 2),
+    "no title and no question": (removed(TITLE, QUESTION), 0, ["was missing"] * 2),
+    "no tests and no metadata": (
+        in_order(removed(SQUARE_TEST), of_every_cell(without_marks)),
+        0,
+        ["7 cells", "was missing"],
+    ),
+    "answers as Markdown": (made("markdown", SQUARE, HALF), 0, ["was made a markdown cell"] * 2),
+    "answers as raw cells": (made("raw", SQUARE, WORDS), 0, ["was made a raw cell"] * 2),
+    "test as a raw cell": (made("raw", SQUARE_TEST), 0, ["was made a raw cell; it is restored"]),
+    "points": (marked(points=20), 0, ["has other points or marks; it is restored"]),
+    "marks": (marked(grade=False), 0, ["has other points or marks; it is restored"]),
+    "moved to the end": (moved, 0, ["not in the order"]),
+}
+FILES = {
+    "a byte order mark": lambda text: text.encode("utf-8-sig"),
+    "UTF-16": lambda text: text.encode("utf-16"),
+    "UTF-16 without a mark": lambda text: text.encode("utf-16-le"),
+    "Windows-1252": lambda text: text.encode("cp1252"),
+}
+
+
+def submitted(release, change=None):
+    """Return a student's file, as a dict."""
+    right = answered(release, **{key.removesuffix("-answer"): v for key, v in GOOD.items()})
+    notebook = json.loads(nbformat.writes(right))
+    if change:
+        change(notebook)
+    return notebook
+
+
+def restored(release, content):
+    notebook = read_notebook(content, "ps0.ipynb")
+    remarks = restore(notebook, nbformat.reads(release, as_version=4))
+    nbformat.validate(notebook)
+    return notebook, remarks
+
+
+def check_found(release, content, added=0):
+    notebook, remarks = restored(release, content)
+    original = nbformat.reads(release, as_version=4)
+    found = {grade_id(each): each for each in notebook.cells if grade_id(each)}
+    for given in original.cells:
+        name = grade_id(given)
+        wanted = copy.deepcopy(given)
+        wanted.source = GOOD.get(name, given.source)
+        assert found[name].source.split() == wanted.source.split(), name
+        assert {**found[name], "source": ""} == {**wanted, "source": ""}
+    assert len(notebook.cells) == len(original.cells) + added
+    return notebook, remarks
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_every_answer_is_found(release, name):
+    change, added, said = FOUND[name]
+    content = json.dumps(submitted(release, change)).encode()
+    notebook, remarks = check_found(release, content, added)
+    assert len(remarks) == len(said), remarks
+    assert all(any(part in remark for remark in remarks) for part in said), remarks
+    names = [grade_id(each) for each in notebook.cells if grade_id(each)]
+    original = nbformat.reads(release, as_version=4)
+    assert names == [*map(grade_id, original.cells)] or name == "moved to the end"
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_in_other_encodings_are_read(release, name):
+    content = FILES[name](json.dumps(submitted(release), ensure_ascii=False))
+    assert check_found(release, content)[1] == []
+
+
+def test_a_damaged_letter_is_replaced_and_its_cell_is_named(release):
+    def change(notebook):
+        notebook["cells"][WORDS]["source"] = "It is \ud83d."
+        notebook["cells"].insert(1, markdown("\udc00"))
+
+    notebook, remarks = restored(release, json.dumps(submitted(release, change)).encode())
+    assert cell(notebook, "words-answer").source == "It is ?."
+    end = "has a damaged letter, which is replaced by “?”"
+    title = "of “A tiny set”"
+    assert remarks == [f"cell 2, added cell {title} {end}", f"cell 9, answer {title} {end}"]
+
+
+def test_pictures_in_answers_are_kept(release):
+    def change(notebook):
+        notebook["cells"][WORDS]["attachments"] = {"a.png": {"image/png": "iVBO"}}
+        split(WORDS, "It is: ")(notebook)
+        notebook["cells"][WORDS]["attachments"] = {"b.png": {"image/png": "iVBO"}}
+
+    notebook, _ = restored(release, json.dumps(submitted(release, change)).encode())
+    assert cell(notebook, "words-answer").source == "It is: \n2 × 2 > 0."
+    assert cell(notebook, "words-answer").attachments.keys() == {"a.png", "b.png"}
+
+
+def test_an_answer_in_the_cell_of_another_answer_counts(release):
+    """The empty answer would define the function again, without its text."""
+
+    def change(notebook):
+        half, square = notebook["cells"][HALF], notebook["cells"][SQUARE]
+        imports = notebook["cells"][IMPORTS]
+        half["source"], square["source"] = f"{GOOD['square-answer']}\n\nhalf = 0.5", SQUARE_STUB
+        notebook["cells"][IMPORTS : IMPORTS + 1] = [imports, half]
+        del notebook["cells"][HALF + 1]
+
+    notebook, remarks = restored(release, json.dumps(submitted(release, change)).encode())
+    assert cell(notebook, "square-answer").source.startswith("# This answer is in another cell")
+    assert any("is empty; another cell has its function" in remark for remark in remarks)
+
+
+def test_texts_in_locked_cells_become_added_cells(release):
+    def change(notebook):
+        notebook["cells"][IMPORTS]["source"] = "import math\nimport cmath"
+        notebook["cells"][SQUARE_TEST]["source"] = "print(square(3))"
+        notebook["cells"][QUESTION]["source"] = ""
+
+    notebook, remarks = restored(release, json.dumps(submitted(release, change)).encode())
+    added = [(at, each.source) for at, each in enumerate(notebook.cells) if not grade_id(each)]
+    assert added == [(2, "import cmath"), (4, "print(square(3))")]
+    assert cell(notebook, "imports").source == "import math"
+    assert [remark.partition(" was changed")[2] for remark in remarks] == [
+        "; it is restored, and its other text is in an added cell",
+        "; it is restored, and its other text is in an added cell",
+        "; it is restored",
+    ]
+
+
+def damaged(notebook, rng):
+    """Damage a notebook in several ways that keep all texts of the student."""
+    for _ in range(rng.integers(1, 6)):
+        cells = notebook["cells"]
+        at, kind = int(rng.integers(len(cells) - 1)), rng.integers(7)
+        source = text(cells[at])
+        if kind == 0:
+            of_every_cell(without_marks)(notebook)
+        elif kind == 1:
+            for each in cells:
+                each.pop("id", None)
+        elif kind == 2 and not re.search("OWN", source):
+            removed(at)(notebook)
+        elif kind == 3 and "\n" in source:
+            split(at, source.split("\n")[0])(notebook)
+        elif kind == 4:
+            merged(at, int(rng.integers(2)))(notebook)
+        elif kind == 5:
+            cells.insert(int(rng.integers(len(cells))), cells.pop(at))
+        elif kind == 6:
+            copied(at, int(rng.integers(len(cells))))(notebook)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_no_text_of_a_student_is_lost(release, seed):
+    """Each word OWN… is in the restored notebook, and the cells of the set are complete."""
+
+    def change(notebook):
+        for at in (SQUARE, HALF, WORDS):
+            notebook["cells"][at]["source"] = f"{text(notebook['cells'][at])}\n\n# OWN{at}"
+        notebook["cells"].insert(3, markdown("OWN8"))
+        notebook["cells"].insert(6, code("# OWN9"))
+        damaged(notebook, np.random.default_rng(seed))
+
+    content = json.dumps(submitted(release, change)).encode()
+    try:
+        notebook, _ = restored(release, content)
+    except Refused as refused:
+        assert "copy your answers" in str(refused)  # noqa: PT017
+        return
+    whole = "\n".join(each.source for each in notebook.cells)
+    assert {*re.findall(r"OWN\d", content.decode())} == {*re.findall(r"OWN\d", whole)}
+    names = sorted(grade_id(each) for each in notebook.cells if grade_id(each))
+    original = nbformat.reads(release, as_version=4)
+    assert names == sorted(map(grade_id, original.cells))
+    for given in original.cells:
+        if not given.metadata.nbgrader.solution:
+            assert {**cell(notebook, grade_id(given)), "id": given.id} == given
+    nbformat.validate(notebook)
+
+
+def of_another_set(each, at):
+    each["metadata"]["nbgrader"]["grade_id"] += "-of-another"
+
+
+def new_notebook_of(*sources):
+    def change(notebook):
+        notebook["cells"] = [code(source) for source in sources]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        (of_every_cell(of_another_set), 0),
+        (new_notebook_of(*GOOD.values()), 0),
+        (new_notebook_of("import math", "half = 0.5"), 1),
+        (in_order(removed(0, 1, 2, 3, 5), of_every_cell(without_marks)), 3),
+    ],
+)
+def test_a_notebook_with_too_few_cells_of_the_set_is_refused(release, change, found):
+    content, original = json.dumps(submitted(release, change)).encode(), nbformat.reads(release, 4)
+    assert count_found(read_notebook(content, "it"), original) == found
+    with pytest.raises(Refused, match=rf"only {found} of the 8 cells .* copy your answers into a"):
+        restored(release, content)
+
+
+CONFLICT = b'{\n<<<<<<< HEAD\n"a": 1\n=======\n>>>>>>> b\n}'
+BROKEN = [b"no json", b'{"cells": 3}', b'{"cells": [3]}', b"[1]", b"3", b"\xff\xfe", CONFLICT]
+BROKEN += [b'{"cells": []}', b'{"cells": ' + b"[" * 10**5, b'{"cells": [{"source": 3}]}']
+BROKEN += [b'{"cells": [{"source": [3]}]}', b'{"nbformat": 4', b"\x00" * 100, b"9" * 5000]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [(b" ", "empty"), (b"%PDF-1.7", "a PDF or an archive"), (b"PK\x03", "a PDF or an archive")]
+    + [(content, "damaged or not a notebook") for content in BROKEN],
+)
+def test_files_without_a_notebook_are_refused(content, said):
+    with pytest.raises(Refused, match=f"^my.ipynb is {said}"):
+        read_notebook(content, "my.ipynb")
