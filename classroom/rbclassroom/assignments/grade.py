@@ -4,6 +4,7 @@ import csv
 import glob
 import html
 import io
+import json
 import logging
 import os
 import re
@@ -38,6 +39,7 @@ from rbcourse.files import replace_file
 WORKERS = 2  # number of students graded at the same time
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
+PROGRESS = "grading.json"  # the file with the results of a run that is not complete
 Job = tuple[str, str]  # the name of a set, and the name of a student
 Row = dict[str, Any]
 
@@ -52,7 +54,8 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
     points exceed the maximum, or change while another student is graded, ValueError is raised and
     no table is written. The file ``gradebook.before-NAME.db`` is a copy of the gradebook before the
     run. Ctrl-C ends the submissions at work, which then count as not graded, and leaves the tables
-    of incomplete sets as they were.
+    of incomplete sets as they were. If a run was interrupted, the next one continues: it does not
+    run again the submissions whose files, and whose set, have not changed since.
     """
     chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
     if not chosen:
@@ -64,8 +67,11 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
         print(f"Submissions run without a sandbox and with all your rights: {why}.", flush=True)
     jobs, tables = [job for name in chosen for job in _prepare(name, assignments)], []
     rows: dict[Job, Row] = {}
+    progress = _Progress(assignments, jobs, boxed=not why)
+    if progress.results:
+        print(f"The earlier run continues: {len(progress.results)} submissions are graded.")
     try:
-        with closing(_graded(jobs, assignments, not why)) as graded:
+        with closing(_graded(jobs, progress, assignments)) as graded:
             for (name, student), row in graded:
                 said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
                 said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
@@ -76,9 +82,10 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
                 own = [job for job in jobs if job[0] == name]
                 if rows.keys() >= {*own}:
                     tables.append(_write_table(name, [rows[job] for job in own], assignments))
+                    progress.forget(own)
     except KeyboardInterrupt:
         count = f"{len(rows)} of {len(jobs)} submissions are graded"
-        print(f"Stopped: {count}. Tables of incomplete sets are not written; run this again.")
+        print(f"Stopped: {count}. Run this again to continue; then the tables are written.")
         raise
     return tables
 
@@ -110,7 +117,7 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
     except PermissionError as error:
         raise ValueError(f"{table} cannot be written; close it in other programs") from error
     before = Path(config.CourseDirectory.root, "gradebook.db")
-    if before.exists():
+    if before.exists() and not (assignments / PROGRESS).exists():
         replace_file(before.with_name(f"gradebook.before-{name}.db"), before.read_bytes())
     update(find_set(name, assignments))
     done = run_step(GenerateAssignment, config)
@@ -129,20 +136,56 @@ def _without_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+class _Progress:
+    """The remarks on the submissions graded in a run, stored until the tables are written."""
+
+    def __init__(self, assignments: Path, jobs: list[Job], boxed: bool) -> None:
+        self.path, self.boxed = assignments / PROGRESS, boxed
+        self.states = {job: [boxed, *_state(job, assignments)] for job in jobs}
+        self.results: dict[Job, list[str]] = {}
+        stored = json.loads(self.path.read_text("utf-8")) if self.path.exists() else []
+        for name, student, state, result in stored:
+            if self.states.get((name, student)) == state:
+                self.results[name, student] = result
+
+    def keep(self, job: Job, remarks: list[str]) -> None:
+        self.results[job] = remarks
+        rows = [[*job, self.states[job], kept] for job, kept in self.results.items()]
+        replace_file(self.path, json.dumps(rows).encode())
+
+    def forget(self, jobs: list[Job]) -> None:
+        for job in jobs:
+            self.results.pop(job, None)
+        if not self.results:
+            self.path.unlink(missing_ok=True)
+
+
+def _state(job: Job, assignments: Path) -> list[list[Any]]:
+    """Return the names, sizes and dates of the files of a submission and of its set."""
+    name, student = job
+    folders = assignments / "submitted" / student / name, find_set(name, assignments)
+    files = [path for folder in folders for path in sorted(folder.iterdir())]
+    facts = [(path.name, path.lstat()) for path in files]
+    return [[name, about.st_size, about.st_mtime_ns] for name, about in facts]
+
+
 def _graded(
-    jobs: list[Job], assignments: Path, boxed: bool
+    jobs: list[Job], progress: _Progress, assignments: Path
 ) -> Generator[tuple[Job, Row], None, None]:
     """Grade submissions in parallel, one per student at a time; yield their rows.
 
     If the caller stops early, the submissions at work are ended, and lose their earlier points and
     their feedback, because a part of the new ones may be stored.
     """
-    course, todo = CourseDirectory(config=course_config(jobs[0][0], assignments)), list(jobs)
+    course = CourseDirectory(config=course_config(jobs[0][0], assignments))
+    todo = [job for job in jobs if job not in progress.results]
     works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
     folder = Path(tempfile.mkdtemp())  # for all kernels
     worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY, str(folder)))
     with Gradebook(course.db_url) as gradebook:
         known = _points(gradebook)
+        earlier = {job: _row(gradebook, *job, result) for job, result in progress.results.items()}
+    yield from earlier.items()
     with ExitStack() as stack:
         stack.callback(sandbox.delete, folder)
         free = [stack.enter_context(worker()) for _ in range(WORKERS)]
@@ -154,19 +197,25 @@ def _graded(
                     job, pool = ready[0], free.pop()
                     todo.remove(job)
                     with _without_ctrl_c():
-                        works[pool.submit(grade_one, *job, assignments, boxed)] = job, pool
+                        work = pool.submit(grade_one, *job, assignments, progress.boxed)
+                        works[work] = job, pool
                     continue
                 for work in wait(works, return_when=FIRST_COMPLETED).done:
                     (name, student), pool = works.pop(work)
                     broken = isinstance(work.exception(), BrokenExecutor)
                     free.append(stack.enter_context(worker()) if broken else pool)
                     with Gradebook(course.db_url) as gradebook:
-                        row = _row(gradebook, assignments, name, student, work)
+                        result = _result(work)
+                        if isinstance(result, str):
+                            _withdraw(gradebook, assignments, name, student)
+                        row = _row(gradebook, name, student, result)
                         known, before = _points(gradebook), known
                     if others := sorted({other for other, *_ in known ^ before} - at_work):
                         when = f"during the grading of {' and '.join(sorted(at_work))}"
                         where = f"The earlier points are in gradebook.before-{name}.db."
                         raise ValueError(f"The points of {others[0]} changed {when}. {where}")
+                    if isinstance(result, list):
+                        progress.keep((name, student), result)
                     yield (name, student), row
         except (KeyboardInterrupt, GeneratorExit):
             with _without_ctrl_c():
@@ -331,12 +380,19 @@ def check_submission(folder: Path, name: str, given: set[str]) -> None:
     read_notebook(path.read_bytes(), wanted)
 
 
-def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[str]]) -> Row:
-    if error := work.exception():  # the other submissions are still graded
-        _withdraw(gradebook, root, name, student)
-        why = str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
-        why = "its process ended, or took too long" if isinstance(error, BrokenExecutor) else why
-        return {"remarks": f"refused: {_tidy(why)}"}
+def _result(work: Future[list[str]]) -> list[str] | str:
+    """Return the remarks on a submission, or the reason why it was refused."""
+    error = work.exception()
+    if isinstance(error, BrokenExecutor):
+        return "its process ended, or took too long"
+    if error:  # the other submissions are still graded
+        return str(error) if isinstance(error, Refused) else f"{type(error).__name__}: {error}"
+    return work.result()
+
+
+def _row(gradebook: Any, name: str, student: str, result: list[str] | str) -> Row:
+    if isinstance(result, str):
+        return {"remarks": f"refused: {_tidy(result)}"}
     submission = gradebook.find_submission_notebook(name, name, student)
     order = [cell.name for cell in submission.notebook.source_cells]
     grades = sorted(submission.grades, key=lambda grade: order.index(grade.name))
@@ -352,7 +408,7 @@ def _row(gradebook: Any, root: Path, name: str, student: str, work: Future[list[
         "maximum": f"{submission.max_score:g}",
         "by hand": " ".join(to_do),
         "late": f"{late / 3600:.1f} h" if late else "",
-        "remarks": "; ".join(map(_tidy, work.result())),
+        "remarks": "; ".join(map(_tidy, result)),
     }
 
 

@@ -377,3 +377,16 @@ def test_after_ctrl_c_the_submissions_at_work_count_as_not_graded(tmp_path, cour
     with course.gradebook() as gradebook:
         assert gradebook.find_submission("ps0", "good one").score == 3
         assert gradebook.find_submission("ps0", "tampers").score == 0
+        gradebook.find_grade("words-answer", "ps0", "ps0", "good one").manual_score = 1
+        gradebook.db.commit()
+    # the next run continues
+    course.submit("tampers", half="half = 0.5")
+    before = course.graded("good one").stat().st_mtime_ns
+    assert grade(["ps0"], course.folder, without_box=True)
+    assert course.graded("good one").stat().st_mtime_ns == before
+    assert (course.rows()["good one"]["total"], course.rows()["tampers"]["total"]) == ("4", "3")
+    # when the table is complete, a run begins again
+    course.submit("tampers")
+    assert grade(["ps0"], course.folder, without_box=True)
+    assert course.graded("good one").stat().st_mtime_ns > before
+    assert not (course.folder / "grading.json").exists()
