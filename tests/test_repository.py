@@ -260,7 +260,8 @@ def distributions_for(requirements):
 
 
 NEEDS_PAGES = ["course.lab", "lecture", "book", "live.engine", "explorers.recorded"]
-NEEDS_GRADING = [f"assignments.{name}" for name in ("__main__", "autograding", "grade", "handout")]
+GRADING = "__main__", "autograding", "feedback", "grade", "handout"
+NEEDS_GRADING = [f"assignments.{name}" for name in GRADING]
 DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # each case lists the installed requirements, and the modules that need more

@@ -4,7 +4,6 @@
 commands and in the formgrader.
 """
 
-import html
 import os
 import re
 import shutil
@@ -13,12 +12,9 @@ import tempfile
 from pathlib import Path
 from typing import Any, cast
 
-import bleach
 import nbformat
-from jinja2 import pass_context
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbconvert.exporters import NotebookExporter
-from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 from nbconvert.preprocessors import CSSHTMLHeaderPreprocessor
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
@@ -26,18 +22,12 @@ from nbgrader import preprocessors as nbgrader
 from traitlets import Bool, Integer
 from traitlets.config import Config
 
-from rbclassroom.assignments import locked_cells, sandbox
+from rbclassroom.assignments import feedback, locked_cells, sandbox
+from rbclassroom.assignments.feedback import LINK, UNSEEN, FeedbackExporter, GetResults, Summarise
 from rbclassroom.assignments.locked_cells import marks_of, name_cell
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 from rbclassroom.assignments.submissions import Refused, read_notebook, restore
 
-UNSEEN = "The visible tests pass, but a hidden test fails.\n"
-# students' HTML is shown without elements that run, load files or imitate the page
-TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl", "dt"}
-TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
-TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
-TAGS |= {"th", "thead", "tr", "ul"}
-LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # a command of MathJax
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 
@@ -58,49 +48,15 @@ def configure(config: Config) -> None:
     config.IgnorePattern.pattern = r"(?s)."
     # the feedback shows a run without hidden tests, with the scores from the gradebook
     clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
-    shown = [nbgrader.GetGrades, *clear, BoxedExecute, CSSHTMLHeaderPreprocessor]
+    shown = [GetResults, *clear, BoxedExecute, Summarise, CSSHTMLHeaderPreprocessor]
     config.GenerateFeedback.preprocessors = shown
+    config.GenerateFeedback.exporter_class = FeedbackExporter
+    config.FeedbackExporter.template_name = "page"
+    config.FeedbackExporter.extra_template_basedirs = [str(Path(__file__).parent / "templates")]
     # the feedback and the formgrader show HTML that cannot run anything
     config.HTMLExporter.sanitize_html = True
     filters = {"clean_html": "inert_html", "markdown2html": "inert_markdown"}
-    config.HTMLExporter.filters = {key: f"{__name__}.{name}" for key, name in filters.items()}
-
-
-def inert_html(content: object) -> str:
-    """Return HTML without scripts, styles, frames, forms, links and external pictures.
-
-    Examples
-    --------
-    >>> inert_html('<p onclick="steal()">x</p><img src="https://a.b/c.png"><script>1</script>')
-    '<p>x</p><img>&lt;script&gt;1&lt;/script&gt;'
-    """
-
-    def is_inert(tag: str, name: str, value: str) -> bool:
-        embedded = name == "src" and value.startswith("data:image/")
-        return tag == "img" and (name in ("alt", "title") or embedded)
-
-    inert = bleach.clean(str(content), TAGS, is_inert, protocols={"data"})
-    return LINK.sub(r"\\text", str(inert))
-
-
-class _Renderer(IPythonRenderer):
-    """Render Markdown; links and missing pictures become text with their addresses."""
-
-    def link(self, text: str, url: str, title: str | None = None) -> str:
-        return f"{text} ({html.escape(url)})"
-
-    def image(self, text: str, url: str, title: str | None = None) -> str:
-        if url.startswith("attachment:") and url.partition(":")[2] not in self.attachments:
-            return f"{text} ({html.escape(url)} is missing)"
-        return str(super().image(text, url, title))
-
-
-@pass_context
-def inert_markdown(context: Any, source: str) -> str:
-    """Return the HTML of Markdown without elements that run or load files."""
-    attached = context.get("cell", {}).get("attachments", {})
-    renderer = _Renderer(escape=False, attachments=attached, exclude_anchor_links=True)
-    return inert_html(MarkdownWithMath(renderer=renderer).render(source))
+    config.HTMLExporter.filters = {key: f"{feedback.__name__}.{f}" for key, f in filters.items()}
 
 
 class ReadSubmission(NotebookExporter):

@@ -2,7 +2,6 @@
 
 import csv
 import glob
-import html
 import io
 import json
 import logging
@@ -323,35 +322,9 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     changed = (key for key, words in _words(graded).items() if words != before.get(key, words))
     remarks += [f"the answer {key} differs from the one that was graded before" for key in changed]
     done = run_step(GenerateFeedback, config)
-    if done["success"]:
-        page = folder / "feedback" / student / name / f"{name}.html"
-        with Gradebook(CourseDirectory(config=config).db_url) as gradebook:
-            to_do = _to_do(gradebook.find_submission_notebook(name, name, student).grades)
-        replace_file(page, _with_titles(page.read_text("utf-8"), graded, to_do).encode())
-    else:
+    if not done["success"]:
         remarks.append(f"no feedback was written: {last_line(done)}")
     return remarks
-
-
-def _with_titles(page: str, graded: Path, to_do: Iterable[str]) -> str:
-    """Name the problems in a page of feedback, and mark those in `to_do` as not graded yet."""
-    cells, names = nbformat.read(graded, as_version=4).cells, dict[str, str]()
-    for at, cell in enumerate(cells):
-        title = re.sub(r" \(\d+ points?\)$", "", locked_cells.title_of(cells, at))
-        names[f"comment-{grade_id(cell)}"] = f"{title}, comment"
-        if locked_cells.marks_of(cell).get("grade"):
-            name = f"{title}, {'in words' if is_answer(cell) else 'tests'}"
-            same = sum(other.startswith(name) for other in names.values())
-            names[grade_id(cell)] = f"{name} {same + 1}" if same else name
-    link = re.compile(r'(<a href="#([\w-]+)">)[^<]*(?=</a>)')
-    page = link.sub(lambda m: m[1] + html.escape(names[m[2]]) if m[2] in names else m[0], page)
-    for key in to_do:
-        page = re.sub(
-            rf'(<a href="#{key}">[^<]*</a>) \(Score: [^)]*\)', r"\1 (not graded yet)", page
-        )
-        panel = re.compile(rf'(<a name="{key}">.*?)Score: [\d. /]+', re.DOTALL)
-        page = panel.sub(r"\1Not graded yet ", page, count=1)
-    return page
 
 
 def _to_do(grades: Iterable[Any]) -> list[str]:

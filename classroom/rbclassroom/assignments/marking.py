@@ -21,6 +21,24 @@ IN_RADIANS = (
 )
 
 
+GENERAL: dict[str, Callable[[Array, Array], list[Array]]] = {
+    "Your result is transposed.": lambda right, got: [right.T],
+    "The entries of your result are in the reverse order.": lambda right, got: [_rows(right)[::-1]],
+    "Your result has the wrong sign.": lambda right, got: [-right],
+    "The digits after the point are cut off: do you fill an array of integers?": (
+        lambda right, got: [np.trunc(right)]
+    ),
+    "Your result is rounded: return all digits.": (
+        lambda right, got: [np.round(right, digits) for digits in range(7)]
+    ),
+    "Your result has one axis too many.": lambda right, got: [right[None], right[..., None]],
+    "Your result is only the beginning of the right one. Is return inside a loop?": (
+        lambda right, got: [_rows(right)[: len(_rows(got))], _rows(right)[0]]
+    ),
+}
+"""The hints of mistakes that can be made in every problem, and the results of these mistakes."""
+
+
 class Mistake(NamedTuple):
     """A common mistake: a hint, and the results of functions that make this mistake."""
 
@@ -73,16 +91,17 @@ class Problem:
         right = [self.same(*pair) for pair in zip(given, self.answers, strict=True)]
         if all(right):
             return
-        if hint := self._hint(given):
-            raise NotYet(hint)
-        numbers = [(value, as_numbers(value)) for value in given]
-        meant = [value if number is None else np.radians(number) for value, number in numbers]
-        if hint := self._hint(meant):  # the student's results are in degrees
-            raise NotYet(f"{IN_RADIANS} There is a second mistake: {hint}")
         first = right.index(False)
         arguments = zip(self.names, self.inputs[first], strict=False)
         called = "For " + ", ".join(f"{name} = {show(value)}" for name, value in arguments)
-        raise NotYet(self._describe(called, given[first], self.answers[first]))
+        case = self._describe(called, given[first], self.answers[first])
+        if hint := self._hint(given) or self._general_hint(given):
+            raise NotYet(hint, case)
+        numbers = [(value, as_numbers(value)) for value in given]
+        meant = [value if number is None else np.radians(number) for value, number in numbers]
+        if hint := self._hint(meant):  # the student's results are in degrees
+            raise NotYet(f"{IN_RADIANS} There is a second mistake: {hint}", case)
+        raise NotYet(case)
 
     def _hint(self, given: list[Any]) -> str:
         for mistake in self.mistakes:
@@ -91,6 +110,16 @@ class Problem:
             if all(any(self.same(got, known) for known in results) for got, *results in trials):
                 return mistake.hint
         return ""
+
+    def _general_hint(self, given: list[Any]) -> str:
+        """Return the hint of a mistake that can be made in every problem, or ""."""
+        hints = list(GENERAL)
+        for pair in zip(given, self.answers, strict=True):
+            got, right = map(as_numbers, pair)
+            if got is None or right is None:
+                return ""
+            hints = [h for h in hints if any(self.same(got, x) for x in GENERAL[h](right, got))]
+        return hints[0] if hints else ""
 
     def _run(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
         arguments = tuple(copy.deepcopy(trial))
@@ -139,6 +168,9 @@ class Drawing(Problem):
         """Return whether each wanted curve was drawn, in either direction."""
         drawn = [*got, *(curve[::-1] for curve in got)]
         return all(any(super(Drawing, self).same(d, w) for d in drawn) for w in wanted)
+
+    def _general_hint(self, given: list[Any]) -> str:
+        return ""
 
     def _run(self, function: Callable[..., Any], trial: Sequence[Any]) -> Any:
         return curves_of(self._draw(function, trial))
@@ -208,6 +240,10 @@ def show(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.size > 16:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]
+
+
+def _rows(array: Array) -> Array:
+    return array if array.ndim else array[None]
 
 
 def _plain(value: Any) -> Any:

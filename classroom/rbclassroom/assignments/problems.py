@@ -27,6 +27,7 @@ def problem(name: str, slug: str) -> Problem | Sampler:
     if not file:
         raise NotYet(f"{name}.json is missing. Copy it from the handout into this folder.")
     data = json.loads(file.read_text("utf-8"), object_hook=_as_array)[slug]
+    data.pop("read", "")  # this is for the feedback page
     data["mistakes"] = [Mistake(**mistake) for mistake in data["mistakes"]]
     if law := data.pop("law", None):
         return Sampler(**LAWS[law], **data)

@@ -7,10 +7,18 @@ from typing import Any
 
 
 class NotYet(AssertionError):
-    """An error with a message for the student, which a notebook shows without a traceback."""
+    """An error with a message for the student, which a notebook shows without a traceback.
+
+    If the message is a hint, `case` says what the function should return, and what it returns.
+    """
+
+    def __init__(self, message: str, case: str = "") -> None:
+        super().__init__(message)
+        self.case = case
 
     def _render_traceback_(self) -> list[str]:
-        return textwrap.wrap(str(self), 80)
+        texts = [textwrap.wrap(text, 80) for text in (str(self), self.case) if text]
+        return [line for lines in texts for line in ("", *lines)][1:]
 
 
 def call_student(function: Any, arguments: tuple[Any, ...], times: int = 1) -> list[Any]:

@@ -2,9 +2,10 @@
 
 The table of the set ``NAME`` is the file ``NAME.toml`` beside its folder. Students do not get the
 table. It has a section ``SLUG`` for the problem with the cells ``SLUG-answer`` and ``SLUG-test``. A
-section has the inputs and common mistakes. Each mistake has a hint, and the bodies of functions
-that make the mistake. The right answers come from the notebook. `own` says which functions an
-answer may use; students see it when an answer is right, and nothing checks it.
+section has the inputs and common mistakes, and says in which lesson to `read` again. Each mistake
+has a hint, and the bodies of functions that make the mistake. The right answers come from the
+notebook. `own` says which functions an answer may use; students see it when an answer is right, and
+nothing checks it.
 """
 
 import copy
@@ -70,7 +71,7 @@ def evaluate(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> dict[str, Any]:
-    kept = "law", "accuracy", "angles"
+    kept = "law", "accuracy", "angles", "read"
     known: dict[str, Any] = {key: problem[key] for key in kept if key in problem}
     inputs = eval(problem.get("inputs", "[]"), space)
     names = list(inspect.signature(space[_name(answer)]).parameters)

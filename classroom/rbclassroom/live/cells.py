@@ -136,7 +136,7 @@ def _take_figures(show: Show | None) -> None:
 def _told(error: BaseException) -> tuple[str, str]:
     """Return an error as a student should read it: its place in the cells, and its message."""
     if hasattr(error, "_render_traceback_"):  # a hint needs no traceback
-        return "hint", str(error)
+        return "hint", f"{error} {getattr(error, 'case', '')}".rstrip()
     lines = [
         f"{frame.filename.strip('<>')}, line {frame.lineno}: {frame.line}"
         for frame in traceback.extract_tb(error.__traceback__)

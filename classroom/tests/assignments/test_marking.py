@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 from test_student_code import student, told
 
 from rbclassroom.assignments.marking import IN_RADIANS, Drawing, Mistake, Problem, curves_of
+from rbclassroom.assignments.student_code import NotYet
 
 X = [(np.array([1.0, -2.0]), 1), (np.array([0.5, 4.0]), 3)]
 DOUBLE = Problem(
@@ -42,7 +43,7 @@ DEGREES = f"{IN_RADIANS} There is a second mistake: sign"
         ("return 'two'", "should return real numbers, not two"),
         ("return [[1], [1, 2]]", "should return real numbers, not [[1], [1, 2]]."),
         ("return x + 0j", "real numbers, not [(1+0j), (-2+0j)]. It is complex"),
-        ("return (2 * k * x)[:1]", "the shape (2,) is wanted; yours is (1,)"),
+        ("return (2 * k * x)[:, None] * [1, 2]", "the shape (2,) is wanted; yours is (2, 2)"),
         ("return x * np.nan", "your result is not finite: [nan, nan]"),
         ("x *= 2 * k\n    return x", "changes its arguments"),
         ("raise NotImplementedError()", "Nothing is written here yet"),
@@ -54,6 +55,39 @@ def test_wrong_answers_get_a_hint_or_a_description_of_the_error(body, said):
     text = told(DOUBLE, f"import numpy as np\ndef answer(x, k):\n    {body}")
     assert text == said if said in ("half", "sign", DEGREES) else said in text
     assert all(map(np.array_equal, before, [x for x, _ in DOUBLE.inputs]))
+
+
+M = [(np.array([[1.25, 2.6], [3.7, -4.9]]),), (np.array([[0.5, -1.5], [2.25, 6.1]]),)]
+SAME = Problem(names=["m"], inputs=M, answers=[m for (m,) in M])
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("return m.T", "transposed"),
+        ("return m[::-1]", "reverse order"),
+        ("return -m", "wrong sign"),
+        ("return m.astype(int)", "cut off: do you fill an array of integers"),
+        ("return m.round(1)", "rounded: return all digits"),
+        ("return m[None]", "one axis too many"),
+        ("return m[..., None]", "one axis too many"),
+        ("return m[:1]", "only the beginning of the right one. Is return inside a loop"),
+        ("return m[0]", "only the beginning of the right one. Is return inside a loop"),
+    ],
+)
+def test_mistakes_that_can_be_made_everywhere_get_a_hint(body, said):
+    assert said in told(SAME, f"def answer(m):\n    {body}")
+    once = f"def answer(m):\n    if m[0, 0] == 0.5: return 3 * m\n    {body}"
+    assert told(SAME, once).startswith("For m = ")
+
+
+def test_hints_are_followed_by_an_example():
+    with pytest.raises(NotYet, match=r"^half$") as refused:
+        DOUBLE.accepts(student("def answer(x, k):\n    return x / 2"))
+    assert refused.value.case == f"For x = [1.0, -2.0], k = 1 {PARTLY}"
+    shown = refused.value._render_traceback_()
+    assert shown[:2] == ["half", ""]
+    assert " ".join(shown[2:]) == refused.value.case
 
 
 def test_full_turns_are_ignored_if_the_problem_says_so():

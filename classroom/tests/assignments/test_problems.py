@@ -103,6 +103,17 @@ def test_wrong_answers_get_their_hints(name, slug):
             judge = replace(judge, draws=8000) if seed else judge
 
 
+@problems
+def test_the_lesson_to_read_again_has_the_section(name, slug):
+    lesson, section = re.fullmatch(
+        r"lesson (\d+), section (\d+)", TABLES[name][slug]["read"]
+    ).groups()
+    (path,) = SOURCE.parents[1].glob(f"{int(lesson):02}_*.ipynb")
+    texts = [cell.source for cell in nbformat.read(path, as_version=4).cells]
+    assert sum(text.startswith(f"## {section} · ") for text in texts) == 1
+    assert known(name, slug)
+
+
 def in_tex(matrix):
     rows = (" & ".join(f"{x:.3g}" for x in row) for row in np.round(matrix, 3) + 0.0)
     return r"$\begin{pmatrix}" + r"\\ ".join(rows) + r"\end{pmatrix}$"

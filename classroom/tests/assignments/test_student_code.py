@@ -28,6 +28,12 @@ def test_errors_in_a_function_are_reported():
         call_student(1.5, (1,))
 
 
+def test_an_answer_that_calls_an_empty_answer_is_told_so():
+    source = "def half(x):\n    raise NotImplementedError()\ndef answer(x): return half(x)"
+    with pytest.raises(NotYet, match="calls half, where nothing is written yet"):
+        call_student(student(source), (1,))
+
+
 def test_a_notebook_shows_the_hint_in_short_lines():
     lines = NotYet("a long hint " * 30)._render_traceback_()
     assert max(map(len, lines)) <= 80

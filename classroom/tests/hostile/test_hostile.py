@@ -159,12 +159,17 @@ def write_words(notebook):
 CELL_5 = "cell 5, answer of “A tiny set”"
 CHANGES = {"writes words": write_words, "forges remarks": forge_remarks}
 SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
+SQUARES["links"] = (
+    "def square(x):\n"
+    "    raise ValueError(r'$\\href{https://evil.example}{x}$ <script>alert(1)</script>')"
+)
 # Each row has a student, an answer, points (none if refused), and how the remark begins.
 OTHERS = [
     ("tells", "half = 0.5", "2 1", ""),
     ("writes words", "half = 0.5", "2 1", ""),
     ("forges remarks", "half = 0.5", "2 1", "cell 2, locked cell of “A tiny set” was changed; it"),
     ("raises", "half = 0.5", "0 1", ""),
+    ("links", "half = 0.5", "0 1", ""),
     ("=cmd|' -C calc'!A0", "half = 1\n100.0", "2 0", ""),  # returns points
     ("loops", f"{begun()}\nwhile True: pass", "2 0", f"{CELL_5}: stopped after"),
     # The endless output is stopped when the time is over, or when the memory is full.
@@ -287,6 +292,7 @@ def test_feedback_pages_contain_no_active_content_of_students(pages):
         assert not re.search(r"\son\w+\s*=|javascript:|evil\.example|<(iframe|form|svg)", tags)
         loaded = re.findall(r"\s(?:src|href)=\"([^\"]*)\"", tags)
         assert all(address.startswith(("data:image/", "#")) for address in loaded), student
+        assert r"\href" not in body.split('class="notebook"')[0], student
     words = pages["writes words"]
     for shown in (">A tiny set</h1>", "$a &lt; b$", PIXEL, r"$\text{https://evil.example}{x}$"):
         assert shown in words
