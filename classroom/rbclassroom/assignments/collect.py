@@ -98,10 +98,11 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
             continue
         rows.append((file.kind or "unmatched", file.label, file.why or why))
         if about:
-            unused[f"{about['name']} {about['id']}".strip()].append(file.label)
+            who = f"{about['name']} {about['id']}".strip()
+            unused[who].append(f"{file.label}: {file.why or why}")
     for uploads in groups.values():
         unused.pop(f"{uploads[0].about['name']} {uploads[0].about['id']}".strip(), None)
-    rows += [("nothing usable", who, ", ".join(labels)) for who, labels in sorted(unused.items())]
+    rows += [("nothing usable", who, "; ".join(reasons)) for who, reasons in sorted(unused.items())]
     namesakes = Counter((name, student) for name, student, _ in groups)
     for (name, student), several in namesakes.items():
         if several > 1 and (submitted / student / name).exists():

@@ -229,15 +229,18 @@ def _graded(
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
     sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
-    for row in _report(assignments):
+    report = _report(assignments)
+    unusable = "".join(row["why"] for row in report if row["list"] == "nothing usable")
+    for row in report:
         what, student = row["what"], row["what"].removesuffix(f", {name}")
+        named = {each for each in sets if each in f"{what} {row['why']}".casefold()}
         if row["list"] == "missing" and student != what and student not in students:
             yield student, "no file was collected"
-        elif row["list"] in ("refused", "unmatched", "nothing usable"):
-            named = {each for each in sets if each in f"{what} {row['why']}".casefold()}
-            if name in named or not named:
-                usable = "nothing usable: " * (row["list"] == "nothing usable")
-                yield what, f"not collected: {usable}{row['why']}"
+        elif row["list"] == "nothing usable" and (name in named or not named):
+            yield what, f"nothing usable was handed in: {row['why']}"
+        elif row["list"] in ("refused", "unmatched") and (name in named or not named):
+            if what not in unusable:  # the student's line has this reason
+                yield what, f"not collected: {row['why']}"
 
 
 def _perhaps_late(assignments: Path) -> set[str]:

@@ -91,6 +91,7 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     if found <= foreign or (work.unmarked and 2 * found < size):
         cure = "copy your answers into a new copy of the notebook that was handed out"
         raise Refused(f"only {found} of the {size} cells are those of this problem set; {cure}")
+    work.join_rest()
     for step in (work.join_copies, work.put_back, work.complete):
         for name in work.wanted:
             step(name)
@@ -175,6 +176,18 @@ class _Restoring:
             if grade_id(cell) in foreign:
                 cell.metadata.nbgrader = NotebookNode()
         return len(foreign)
+
+    def join_rest(self) -> None:
+        """Join an added cell that begins in the middle of a function with the cell above."""
+        for cell in reversed(self.cells[1:]):
+            above = self.cells[self.place(cell) - 1]
+            free = not grade_id(above) or is_answer(self.wanted[grade_id(above)])
+            if free and not grade_id(cell) and re.match(r"\n*[ \t]+\S", cell.source):
+                _fill(above, [above, cell], "\n")
+                del self.cells[self.place(cell)]
+                self.changes.append(
+                    (grade_id(above) or above.id, "was split; its parts are joined")
+                )
 
     def join_copies(self, name: str) -> None:
         """Let one cell have each name: a split cell is joined, and of copies the last one counts.

@@ -200,6 +200,10 @@ LISTED = [
     ("refused", "Bob_1_assignsubmission_file_/ps0.ipynb", "it is empty"),
     ("unmatched", "Eve_2_assignsubmission_file_/work.ipynb", "it is not a notebook of a handout"),
     ("unmatched", "Dan_3_assignsubmission_file_/ps1.ipynb", "it is not a notebook of a handout"),
+    ("nothing usable", "Fay 4", "F_4_assignsubmission_file_/a.pdf: it is neither a notebook nor"),
+    ("nothing usable", "Gus 5", "G_5_assignsubmission_file_/ps0.ipynb: it is empty"),
+    ("refused", "G_5_assignsubmission_file_/ps0.ipynb", "it is empty"),
+    ("nothing usable", "Hal 6", "H_6_assignsubmission_file_/ps1.ipynb: it is empty"),
     ("missing", "cid, ps0", "Cid Cole"),
     ("missing", "tampers, ps0", "Ann Ames"),
     ("missing", "cid, ps1", "Cid Cole"),
@@ -264,6 +268,8 @@ def test_the_table_lists_students_who_were_not_graded(again):
         LISTED[0][1]: "not collected: it is empty",
         LISTED[1][1]: "not collected: it is not a notebook of a handout",
         "cid": "no file was collected",
+        "Fay 4": f"nothing usable was handed in: {LISTED[3][2]}",
+        "Gus 5": f"nothing usable was handed in: {LISTED[4][2]}",
     }
 
 

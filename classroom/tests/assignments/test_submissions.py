@@ -266,6 +266,16 @@ FOUND = {
     "question merged into the words": (merged(QUESTION, 1), 0, ["was missing"]),
     "words in the question": (in_question, 0, [CHANGED, ADDED]),
     "split function": (split(SQUARE, "(x):\n"), 0, ["was split"]),
+    "split function without marks": (
+        in_order(split(SQUARE, "(x):\n"), of_every_cell(without_marks)),
+        0,
+        ["was split", "8 cells"],
+    ),
+    "split function without marks and ids": (
+        in_order(split(SQUARE, "(x):\n"), of_every_cell(without_marks_and_ids)),
+        0,
+        ["5 cells", *[ADDED] * 3],
+    ),
     "split words": (split(WORDS, "It is: "), 0, ["was split"]),
     "split test": (split(SQUARE_TEST, "square(2)"), 0, ["was split"]),
     "copied stub": (copied(SQUARE, SQUARE + 1, SQUARE_STUB), 0, []),
