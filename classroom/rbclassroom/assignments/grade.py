@@ -236,11 +236,12 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
         named = {each for each in sets if each in f"{what} {row['why']}".casefold()}
         if row["list"] == "missing" and student != what and student not in students:
             yield student, "no file was collected"
-        elif row["list"] == "nothing usable" and (name in named or not named):
+        elif named and name not in named:
+            continue
+        elif row["list"] == "nothing usable":
             yield what, f"nothing usable was handed in: {row['why']}"
-        elif row["list"] in ("refused", "unmatched") and (name in named or not named):
-            if what not in unusable:  # the student's line has this reason
-                yield what, f"not collected: {row['why']}"
+        elif row["list"] in ("refused", "unmatched") and what not in unusable:
+            yield what, f"not collected: {row['why']}"
 
 
 def _perhaps_late(assignments: Path) -> set[str]:
