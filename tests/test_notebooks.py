@@ -10,6 +10,7 @@ from PIL import Image
 
 from rbclassroom.course import notebooks
 from rbclassroom.course.agreement import BASE64
+from rbclassroom.live.cells import _names, parsed
 
 ROOT = Path(__file__).parents[1]
 STORED = ROOT / "figures"
@@ -33,7 +34,8 @@ def faults(notebook):
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     if notebook.metadata.get("kernelspec", {}).get("name") != "python3":
         yield "the kernel is not python3"
-    if sum(cell.source.startswith("# ") for cell in notebook.cells) != 1:
+    texts = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
+    if sum(text.startswith("# ") for text in texts) != 1:
         yield "not one title"
     for cell in notebook.cells:
         lines, tags = cell.source.splitlines(), cell.metadata.get("tags", [])
@@ -63,6 +65,38 @@ def faults(notebook):
 @every_lesson
 def test_stored_lessons_are_complete(path):
     assert list(faults(LESSONS[path])) == []
+
+
+def needs_of_visible_cells(notebook):
+    """Yield the names in visible cells whose last value comes from a cell below a collapsed
+    heading, which a reader may not have run."""
+    collapsed, hidden = 0, {}
+    for cell in notebook.cells:
+        if heading := re.match(r"#+", cell.source) if cell.cell_type == "markdown" else None:
+            level = len(heading[0])
+            collapsed = 0 if level <= collapsed else collapsed
+            collapsed = level if cell.metadata.get("jp-MarkdownHeadingCollapsed") else collapsed
+        if cell.cell_type == "code":
+            for statement in parsed(cell.source, cell.id):
+                read, bound = _names(statement)
+                needed = {name for name in read - bound if hidden.get(name)}
+                yield from (f"{cell.id} needs {name}" for name in needed if not collapsed)
+                hidden |= dict.fromkeys(bound, bool(collapsed))
+
+
+@every_lesson
+def test_visible_cells_need_no_hidden_ones(path):
+    assert list(needs_of_visible_cells(LESSONS[path])) == []
+
+
+@every_lesson
+def test_every_exercise_in_code_has_a_cell_for_the_reader(path):
+    heads = [c.source.splitlines()[0] for c in LESSONS[path].cells if c.source.startswith("### ")]
+    wanted = [
+        re.search(r"\d+", head)[0] for head in heads if re.match(r"### Exercise .*, in code", head)
+    ]
+    own = [cell.id for cell in LESSONS[path].cells if cell.source == "# Your code"]
+    assert own == [f"your-code-{number}" for number in wanted]
 
 
 @pytest.mark.parametrize("path", TAUGHT, ids=lambda path: path.stem)
