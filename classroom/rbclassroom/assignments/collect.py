@@ -10,10 +10,11 @@ with a later date need not be late.
 import contextlib
 import csv
 import io
+import json
 import re
 import unicodedata
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -31,10 +32,10 @@ CLEAR = [  # each of these patterns matches a whole path, and no other files hav
         # Moodle: Anna Berg_1234567_assignsubmission_file_/ps1.ipynb
         r"(?P<name>[^/]+?)(?:_(?P<id>\d+))?_assignsubmission_[a-z]+(?:_?/|_)(?P<file>.+)",
         # Blackboard: Set 1_aberg_attempt_2026-11-30-23-59-00_ps1.ipynb
-        r"[^/]+_(?P<name>[^/_]+)_attempt_(?P<date>\d{4}(?:-\d\d){5})(?:_|\.txt)(?P<file>.*)",
+        r"[^/]+?_(?P<name>[^/]+?)_attempt_(?P<date>\d{4}(?:-\d\d){5})(?:_|\.txt)(?P<file>.*)",
         # Brightspace: 397063-2557369 - Anna Berg - Nov 30, 2026 1159 PM/ps1.ipynb
-        r"\d+-\d+ ?- ?(?P<name>[^/]+?) ?- ?(?P<date>[^/-]* \d{4} \d{3,4}(?: [AP]M)?)(?:/| ?- ?)"
-        r"(?P<file>.+)",
+        r"(?P<id>\d+-\d+) ?- ?(?P<name>[^/]+?) ?- ?(?P<date>[^/-]* \d{4} \d{3,4}(?: [AP]M)?)"
+        r"(?:/| ?- ?)(?P<file>.+)",
     )
 ]
 ILIAS = re.compile(r"(?P<name>.+_.+)_[^_]+_(?P<id>\d+)")  # a folder: Berg_Anna_aberg_4711
@@ -43,8 +44,11 @@ CANVAS = re.compile(  # a file: berganna_LATE_12345_67890_ps1.ipynb, but not 202
     r"_(?P<number>\d+)_(?P<file>.+)"
 )
 DATES = "%Y-%m-%d-%H-%M-%S", "%b %d, %Y %I%M %p"  # of Blackboard and Brightspace
+PERSON = re.compile(r"[^\W\d_a-z]\w+[ _]+[^\W\d_a-z]\w+")  # as in "Anna Berg - ps1.ipynb"
+GENERIC = {"to_submit", "work", "submissions", "submission", "downloads", "assignments", "email"}
 JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_Store)$")
 FILE_BYTES, UPLOAD_BYTES, DOWNLOAD_BYTES = 30_000_000, 100_000_000, 4_000_000_000
+NOBODY = -1  # the level of a notebook that cannot be assigned to a student
 DEPTH = 4  # zips in zips
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
 LISTS += ["nothing usable", "not on the roster", "missing"]
@@ -86,31 +90,49 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     groups = defaultdict[tuple[str, str, str], list[Upload]](list)
     unused = defaultdict[str, list[str]](list)  # files of students without a notebook
     files = list(_find(folder))
-    for file, about in zip(files, _owners(files), strict=True):
-        name, why = "", "neither its name nor a folder names a student"
-        if about and not file.kind:
-            name, why = _match(file, about, sets)
+    found = ["" if file.kind else _set_of(file, sets) for file in files]
+    for file, name, about in zip(files, found, _owners(files, found), strict=True):
+        why = (
+            _mismatch(name, about, sets)
+            if about
+            else "neither its name nor a folder names a student"
+        )
+        why = file.why or why
         if about and not why:
             prepared = "/to_submit/" in f"/{about['file']}"
             place, first = (about["date"], prepared, file.label), int(about["number"] or 0)
             upload = Upload(first, *place, about, file.content)
-            groups[name, _student(about, roster), about["id"]].append(upload)
+            number = about["id"] or about["folder"] or about["name"]
+            groups[name, _student(about, roster), number].append(upload)
             continue
-        rows.append((file.kind or "unmatched", file.label, file.why or why))
+        rows.append((file.kind or "unmatched", file.label, why))
         if about:
             who = f"{about['name']} {about['id']}".strip()
-            unused[who].append(f"{file.label}: {file.why or why}")
+            unused[who].append(f"{file.label}: {why}")
     for uploads in groups.values():
         unused.pop(f"{uploads[0].about['name']} {uploads[0].about['id']}".strip(), None)
     rows += [("nothing usable", who, "; ".join(reasons)) for who, reasons in sorted(unused.items())]
-    namesakes = Counter((name, student) for name, student, _ in groups)
-    for (name, student), several in namesakes.items():
-        if several > 1 and (submitted / student / name).exists():
-            why = f"{several} students have this name, and now numbered folders; delete this one"
+    numbers = defaultdict[tuple[str, str], list[str]](list)
+    for name, student, number in sorted(groups):
+        numbers[name, student].append(number)
+    stored = submitted / "owners.json"
+    before: dict[str, str] = json.loads(stored.read_text("utf-8")) if stored.exists() else {}
+    for (name, student), several in numbers.items():
+        if len(several) > 1 and (submitted / student / name).exists():
+            why = (
+                f"{len(several)} students have this name, and now numbered folders; delete this one"
+            )
             rows.append(("duplicates", f"submitted/{student}/{name}", why))
     for (name, student, number), uploads in sorted(groups.items()):
         *others, best = sorted(uploads, key=lambda upload: upload[:4])
-        who = student if namesakes[name, student] == 1 else f"{student}_{_plain(number)}"
+        same, who = numbers[name, student], student
+        is_known = student in {row["id"] for row in roster}
+        another = before.get(f"{student}/{name}", best.about["id"]) != best.about["id"]
+        if len(same) > 1 or (another and not is_known):
+            plain = [_plain(each) for each in same]
+            apart = len({*plain}) == len(plain)
+            who = f"{student}_{_plain(number) if apart else same.index(number) + 1}"
+        before[f"{who}/{name}"] = best.about["id"]
         rows += [("duplicates", other.file, f"{best.file} is used instead") for other in others]
         rows.append(_take(best, submitted / who / name))
         if best.about.get("late"):
@@ -127,6 +149,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
                 words = f"{row.get('first_name', '')} {row.get('last_name', '')}".strip()
                 rows.append(("missing", f"{row['id']}, {name}", words))
     lines = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
+    write_whole(stored, json.dumps(before).encode())
     write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": ""}])
     return rows
 
@@ -140,8 +163,11 @@ def _find(folder: Path) -> Iterator[File]:
         if path.is_symlink():
             yield File(parts, dates, label, "refused", "it is a link")
         elif path.is_file():
-            with path.open("rb") as stream:
-                yield from _look(File(parts, dates, label, "", ""), stream, [DOWNLOAD_BYTES])
+            try:
+                with path.open("rb") as stream:
+                    yield from _look(File(parts, dates, label, "", ""), stream, [DOWNLOAD_BYTES])
+            except OSError as error:
+                yield File(parts, dates, label, "refused", str(error.strerror))
 
 
 def _look(file: File, stream: IO[bytes], room: list[int], depth: int = 0) -> Iterator[File]:
@@ -178,7 +204,10 @@ def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iter
     for entry in entries:
         name = _shown(entry.filename)
         inner = [part for part in re.split(r"[/\\]", name) if part not in ("", ".", "..")] or ["?"]
-        dates = (*file.dates, *[None] * (len(inner) - 1), datetime(*entry.date_time))
+        when = file.dates[-1]
+        with contextlib.suppress(ValueError):  # some programs write no date
+            when = datetime(*entry.date_time)
+        dates = (*file.dates, *[None] * (len(inner) - 1), when)
         found = File((*file.parts, *inner), dates, f"{file.label}: {name}", "", "")
         try:
             # one small block of bzip2 or LZMA can become gigabytes
@@ -204,29 +233,67 @@ def _holds_notebook(content: bytes) -> bool:
     return False
 
 
-def _owners(files: list[File]) -> list[dict[str, str] | None]:
-    """Return for each file the name, the id and so on of its student, or None."""
+def _owners(files: list[File], found: list[str]) -> list[dict[str, str] | None]:
+    """Return for each file the name, the id and so on of its student, or None.
+
+    `found` has the set of each notebook.
+    """
     beside = defaultdict[tuple[str, ...], set[str]](set)  # the parts below each path
     for file in files:
         for at in range(len(file.parts) * (not file.kind)):
             beside[file.parts[:at]].add(file.parts[at])
     owners = [_owner(file, beside) for file in files]
-    # in the other downloads, the folders below a common folder belong to one student each
+    # in the other downloads, one folder belongs to each student
     named = {f.parts[0] for f, owner in zip(files, owners, strict=True) if owner and f.parts[1:]}
     loose = {at: f.parts for at, f in enumerate(files) if f.parts[1:] and f.parts[0] not in named}
-    folders = {parts[:-1] for at, parts in loose.items() if not files[at].kind}
-    common = max(folders, default=())[: -1 if len(folders) == 1 else None]
-    while not all(folder[: len(common)] == common for folder in folders):
-        common = common[:-1]
-    level = len(common)
-    inside = {at: p for at, p in loose.items() if p[:level] == common and p[level + 1 :]}
-    words = {parts[level]: sorted(_plain(parts[level]).split("_")) for parts in inside.values()}
-    for at, parts in inside.items():
-        same = sorted(name for name in words if words[name] == words[parts[level]])
-        number = str(same.index(parts[level]) + 1) if same[1:] else ""  # folders with one name
-        found = {"name": parts[level].removesuffix(".zip"), "id": number}
-        owners[at] = _about({**found, "file": "/".join(parts[level + 1 :])}, files[at], level)
+    notebooks = {at: parts for at, parts in loose.items() if not files[at].kind}
+    levels = {at: k for at, k in _levels(notebooks, 0, found).items() if k != NOBODY}
+    above = {parts[: levels[at]] for at, parts in notebooks.items() if at in levels}
+    for at, parts in loose.items():
+        level = next((k for k in range(len(parts) - 1) if parts[:k] in above), 0)
+        if (
+            parts[:level] in above
+            and levels.get(at, level) == level
+            and (at in levels or files[at].kind)
+        ):
+            about = {
+                "name": parts[level].removesuffix(".zip"),
+                "folder": "/".join(parts[: level + 1]),
+            }
+            about["file"] = "/".join(parts[level + 1 :])
+            owners[at] = _about(about, files[at], level)
     return owners
+
+
+def _levels(notebooks: dict[int, tuple[str, ...]], level: int, found: list[str]) -> dict[int, int]:
+    """Return for each notebook which part of its path names the student, if one does.
+
+    `found` has the sets of the files. A folder belongs to a class if folders in it have notebooks
+    of the same set, and to nobody if its notebooks have the names of several persons.
+    """
+    below = defaultdict[str, dict[int, tuple[str, ...]]](dict)
+    for at, parts in notebooks.items():
+        if len(parts) > level + 1:
+            below[parts[level]][at] = parts
+    own, deeper, classes = dict[int, int](), dict[int, int](), False
+    for folder, inside in below.items():
+        direct = {at: parts for at, parts in inside.items() if len(parts) == level + 2}
+        under = _levels(inside, level + 1, found)
+        students = Counter(
+            (found[at], inside[at][: k + 1]) for at, k in under.items() if k != NOBODY
+        )
+        sets = Counter(name for name, _ in students)
+        persons = {m[0] for parts in direct.values() if (m := PERSON.search(parts[-1]))}
+        is_class = not direct and max(sets.values(), default=0) > 1
+        classes = classes or is_class
+        if len(persons) > 1 or (not direct and NOBODY in under.values()):
+            own |= dict.fromkeys(inside, NOBODY)
+        elif folder.removesuffix(".zip").casefold() in GENERIC.union(found) or is_class:
+            own |= under
+        else:
+            own |= dict.fromkeys(inside, level)
+            deeper |= under if not direct else {}
+    return own | (deeper if classes else {})
 
 
 def _owner(file: File, beside: dict[tuple[str, ...], set[str]]) -> dict[str, str] | None:
@@ -262,20 +329,21 @@ def _is_class(above: tuple[str, ...], siblings: set[str]) -> bool:
 
 def _about(found: dict[str, Any], file: File, at: int) -> dict[str, str]:
     """Complete the data of a student; the date is that of the upload, not of a file in a zip."""
-    about = dict.fromkeys(("name", "id", "late", "number", "file", "exact"), "")
+    about = dict.fromkeys(("name", "id", "folder", "late", "number", "file", "exact"), "")
     about |= {key: value or "" for key, value in found.items()}
-    date = next(date for date in file.dates[at:] if date)
+    written = _written(next(date for date in file.dates[at:] if date))
     for form in DATES:
-        with contextlib.suppress(ValueError):
-            date, about["exact"] = datetime.strptime(about.get("date", ""), form), "yes"
-    return about | {"date": _written(date)}
+        with contextlib.suppress(ValueError, OverflowError):
+            written = _written(datetime.strptime(about.get("date", ""), form))
+            about["exact"] = "yes"
+    return about | {"date": written}
 
 
 def _shown(name: str) -> str:
     """Return a name in normal form C, without control characters."""
     with contextlib.suppress(UnicodeError):  # many zips do not declare that their names are UTF-8
         name = name.encode("cp437").decode("utf-8")
-    name = name.encode("utf-8", "replace").decode("utf-8")
+    name = name.encode("utf-8", "backslashreplace").decode("utf-8")
     return re.sub(r"[\x00-\x1f]", "?", unicodedata.normalize("NFC", name))
 
 
@@ -311,18 +379,25 @@ def _read_roster(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def _match(
-    file: File, about: dict[str, str], sets: dict[str, list[NotebookNode]]
-) -> tuple[str, str]:
-    """Return the set that fits a notebook's cells, and a reason if the notebook is not used."""
-    notebook, stem = read_notebook(file.content, "it"), Path(about["file"]).stem
+def _set_of(file: File, sets: dict[str, list[NotebookNode]]) -> str:
+    """Return the set with the most cells in a notebook, or ""."""
+    notebook = read_notebook(file.content, "it")
     shared = {name: max(count_found(notebook, one) for one in own) for name, own in sets.items()}
-    named = [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", stem, re.IGNORECASE)]
+    named = _named(file.parts[-1], sets)
     best = max(sets, key=lambda name: (shared[name], name in named))
-    if not shared[best]:
-        return "", "it is not a notebook of a handout"
-    misnamed = named and best not in named
-    return best, f"its name is {named[0]}, its cells are of {best}" if misnamed else ""
+    return best if shared[best] else ""
+
+
+def _named(name: str, sets: Iterable[str]) -> list[str]:
+    return [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", name, re.IGNORECASE)]
+
+
+def _mismatch(name: str, about: dict[str, str], sets: Iterable[str]) -> str:
+    """Return why a notebook is not used for the set that its cells belong to, or ""."""
+    named = _named(Path(about["file"]).stem, sets)
+    if not name:
+        return "it is not a notebook of a handout"
+    return f"its name is {named[0]}, its cells are of {name}" if named and name not in named else ""
 
 
 def _plain(name: str) -> str:

@@ -61,7 +61,7 @@ def _damaged(name: str, why: str) -> Refused:
 
 def _clean(raw: dict[str, Any]) -> NotebookNode:
     kind = raw.get("cell_type") or ("code" if "outputs" in raw else "markdown")
-    text = raw.get("source", raw.get("input", ""))  # version 3 has "input"
+    text = raw.get("source", raw.get("input")) or ""  # version 3 has "input"
     if isinstance(text, list):  # some programs leave out the ends of the lines
         text = ("" if any("\n" in line for line in text) else "\n").join(text)
     text = text.replace("\r\n", "\n").replace("\r", "\n")
@@ -69,13 +69,14 @@ def _clean(raw: dict[str, Any]) -> NotebookNode:
         text = f"{'#' * raw['level']} {text}"
     cell = MAKE.get(kind, new_markdown_cell)(text.encode("utf-8", "replace").decode())
     about, attached = raw.get("metadata") or {}, raw.get("attachments") or {}
+    pictures = {name: each for name, each in attached.items() if isinstance(each, dict)}
     # Colab writes the id into the metadata
     cell.metadata.ids = [str(each["id"]) for each in (raw, about) if "id" in each]
     cell.metadata.damaged = text != cell.source
     if isinstance(about.get("nbgrader"), dict):
         cell.metadata.nbgrader = NotebookNode(about["nbgrader"])
-    if attached and cell.cell_type == "markdown":
-        cell.attachments = NotebookNode(attached)
+    if pictures and cell.cell_type != "code":
+        cell.attachments = NotebookNode(pictures)
     return cell
 
 
@@ -83,12 +84,12 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     """Restore the cells of a set in a student's notebook, and return remarks on the changes.
 
     Answers keep their texts, and all cells keep the student's order. Raise `Refused` if less than
-    half of a set without marks is there, or if most cells belong to another set.
+    half of the set is there, and most marks are lost or belong to another set.
     """
     work = _Restoring(notebook.cells, original)
     foreign = work.find()
     found, size = len({*work.names()} & work.wanted.keys()), len(work.wanted)
-    if found <= foreign or (work.unmarked and 2 * found < size):
+    if found - work.unmarked <= foreign and 2 * found < size:
         cure = "copy your answers into a new copy of the notebook that was handed out"
         raise Refused(f"only {found} of the {size} cells are those of this problem set; {cure}")
     work.join_rest()
@@ -125,18 +126,35 @@ def _lines(cell: NotebookNode) -> set[str]:
     return {line.strip() for line in cell.source.split("\n")} - {""}
 
 
-def _heads(cell: NotebookNode) -> list[str]:
-    """Return the beginnings of the functions and classes that a cell defines."""
-    return re.findall(r"^(?:def|class) +\w+", cell.source, re.MULTILINE)
+def _defines(cell: NotebookNode, given: NotebookNode) -> bool:
+    """Tell whether a cell defines a function or class of an answer that was handed out."""
+    names = re.findall(r"^(?:def|class) +(\w+)", given.source, re.MULTILINE)
+    forms = r"^[ \t]*(?:async[ \t]+)?(?:def|class)[ \t]+{0}\b|^{0}[ \t]*=(?!=)"
+    return any(re.search(forms.format(name), cell.source, re.MULTILINE) for name in names)
+
+
+def _is_code(text: str) -> bool:
+    """Tell whether a text is complete Python; lines for IPython count as Python."""
+    try:
+        compile(re.sub(r"^([ \t]*)[%!].*", r"\1pass", text, flags=re.MULTILINE), "", "exec")
+    except (SyntaxError, ValueError):
+        return False
+    return True
 
 
 def _fill(target: NotebookNode, cells: list[NotebookNode], gap: str = "\n\n") -> None:
     """Give the texts and the pictures of some cells to a cell."""
-    target.source = gap.join(cell.source for cell in cells)
+    texts, pictures = [], dict[str, Any]()
+    for at, cell in enumerate(cells):
+        text = cell.source
+        for name, picture in cell.get("attachments", {}).items():
+            own = f"{at}-{name}" if pictures.get(name, picture) != picture else name
+            pictures[own], text = picture, text.replace(f"attachment:{name}", f"attachment:{own}")
+        texts.append(text)
+    target.source = gap.join(texts)
     target.metadata.damaged = any(cell.metadata.get("damaged") for cell in cells)
-    attached = [cell.attachments for cell in cells if "attachments" in cell]
-    if attached and target.cell_type == "markdown":
-        target.attachments = NotebookNode({k: v for each in attached for k, v in each.items()})
+    if pictures and target.cell_type != "code":
+        target.attachments = NotebookNode(pictures)
 
 
 class _Restoring:
@@ -156,7 +174,11 @@ class _Restoring:
 
     def is_empty(self, cell: NotebookNode) -> bool:
         """Tell whether a cell of the set has no other text than the original."""
-        return _core(cell.source) in ("", _core(self.wanted[grade_id(cell)].source))
+        given, own = (
+            _core(each.source.replace("# YOUR CODE HERE", ""))
+            for each in (self.wanted[grade_id(cell)], cell)
+        )
+        return own in ("", given)
 
     def find(self) -> int:
         """Name the cells of the set by mark, id or text; return the number of other names."""
@@ -182,7 +204,10 @@ class _Restoring:
         for cell in reversed(self.cells[1:]):
             above = self.cells[self.place(cell) - 1]
             free = not grade_id(above) or is_answer(self.wanted[grade_id(above)])
-            if free and not grade_id(cell) and re.match(r"\n*[ \t]+\S", cell.source):
+            code = above.cell_type == cell.cell_type == "code"
+            begun = re.match(r"\n*[ \t]+\S", cell.source)
+            whole = _is_code(f"{above.source}\n{cell.source}")
+            if free and code and begun and whole and not grade_id(cell):
                 _fill(above, [above, cell], "\n")
                 del self.cells[self.place(cell)]
                 self.changes.append(
@@ -197,11 +222,19 @@ class _Restoring:
         copies = [cell for cell in self.cells if grade_id(cell) == name]
         if len(copies) < 2:
             return
-        filled, heads = [c for c in copies if not self.is_empty(c)], _heads(self.wanted[name])
-        best = (filled or copies)[-1]
-        near = self.place(copies[-1]) - self.place(copies[0]) < len(copies)
-        if len(filled) > 1 and near and not any({*_heads(c)} & {*heads} for c in filled[1:]):
-            _fill(best, filled, "\n")
+        given, order = self.wanted[name], list(self.wanted)
+        filled = [cell for cell in copies if not self.is_empty(cell)]
+        same = [cell for cell in filled if cell.cell_type == given.cell_type] or filled
+        before = order[: order.index(name)][
+            -1:
+        ]  # the cell above, whose name is also above an answer
+        liked = [cell for cell in same if _defines(cell, given)]
+        liked = liked or [cell for cell in same if self.names()[: self.place(cell)][-1:] == before]
+        best = (liked or same or copies)[-1]
+        if not is_answer(given) and len(filled) < len(copies):
+            best = [cell for cell in copies if self.is_empty(cell)][-1]  # it was not changed
+        elif self.are_parts(same, given) and len(same) == len(filled):
+            _fill(best, same, "\n")
             self.changes.append((name, "was split; its parts are joined"))
             filled = [best]
         for cell in copies:
@@ -209,9 +242,17 @@ class _Restoring:
                 continue
             if cell in filled:
                 cell.metadata.nbgrader = NotebookNode()
-                self.changes.append((cell.id, "is an earlier copy; the last one counts"))
+                self.changes.append((cell.id, "is a copy; another one counts"))
             else:
                 del self.cells[self.place(cell)]
+
+    def are_parts(self, cells: list[NotebookNode], given: NotebookNode) -> bool:
+        """Tell whether cells are the parts of one cell, and not copies of it."""
+        near = cells and self.place(cells[-1]) - self.place(cells[0]) < len(cells)
+        again = any(_defines(cell, given) for cell in cells[1:])
+        text = "\n".join(cell.source for cell in cells)
+        sound = given.cell_type != "code" or not is_answer(given) or _is_code(text)
+        return bool(near and len(cells) > 1 and not again and sound)
 
     def put_back(self, name: str) -> None:
         """Restore a cell that is there; the student's text in a locked cell becomes added cells."""
@@ -229,12 +270,12 @@ class _Restoring:
             f"was made a {cell.cell_type} cell": cell.cell_type != given.cell_type,
             "has other points or marks": len(own) > 2 and own != marks,
         }
-        at, make = self.place(cell), MAKE[cell.cell_type]
-        self.cells[at : at + 1] = [
-            *([make(before)] if before else []),
-            kept,
-            *([make(after)] if after else []),
-        ]
+        at, added = self.place(cell), list[list[NotebookNode]]()
+        for text in (before, after):
+            own_cell = MAKE[cell.cell_type]()
+            _fill(own_cell, [NotebookNode(cell, source=text)])
+            added.append([own_cell] if text else [])
+        self.cells[at : at + 1] = [*added[0], kept, *added[1]]
         if what := " and ".join(change for change, made in changes.items() if made):
             saved = ", and its other text is in an added cell" * bool(before or after)
             self.changes.append((name, f"{what}; it is restored{saved}"))
@@ -251,12 +292,13 @@ class _Restoring:
         before, after = order[: order.index(name)][-1:], order[order.index(name) + 1 :][:1]
         above = names.index(before[0]) if before else -1
         below = next((k for k in range(above + 1, len(names)) if names[k] not in ("", name)), None)
+        end = names.index(after[0]) if after and after[0] in names else None
         gap = self.cells[above + 1 : below]
         found = self.search(given, gap) if is_answer(given) else []
         if found:
             _fill(new, found)
             self.changes.append((name, "has the text of an added cell"))
-        elif any({*_heads(cell)} & {*_heads(given)} for cell in self.cells if cell is not old):
+        elif any(_defines(cell, given) for cell in self.cells[:end] if cell is not old):
             new.source = ELSEWHERE
             self.changes.append((name, "is empty; another cell has its function"))
         elif not old:
@@ -284,10 +326,11 @@ class _Restoring:
         """Return the added cells that make up an answer, whose place is in `gap`."""
         own = [cell for cell in self.cells if not grade_id(cell) and cell.source.strip()]
         near = [cell for cell in own if any(cell is each for each in gap)]
-        if not _heads(given):
-            return [cell for cell in near if cell.cell_type == given.cell_type]
-        fits = [[c for c in cells if {*_heads(c)} & {*_heads(given)}] for cells in (own, near)]
-        return (fits[1] or fits[0])[-1:]
+        kinds = [[c for c in cells if c.cell_type == given.cell_type] for cells in (near, own)]
+        if "def " not in given.source and "class " not in given.source:
+            return kinds[0] or [cell for cell in near if cell.cell_type == "raw"]
+        fits = [[c for c in cells if _defines(c, given)] for cells in (*kinds, near, own)]
+        return next((cells[-1:] for cells in fits if cells), [])
 
     def finish(self) -> list[str]:
         """Set the metadata of added cells, and return the remarks."""

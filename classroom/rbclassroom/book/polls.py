@@ -4,6 +4,7 @@ import re
 
 from nbformat import NotebookNode
 
+VOTE = re.compile(r"^explorers\.poll\(", re.MULTILINE)  # in a cell with buttons for JupyterLab
 _OPTION = re.compile(r"^- \*\*([A-Z])\*\* · (.*)$", re.MULTILINE)
 _ITEM = re.compile(r"^- (?=\*\*[A-Z]\*\*)(.*(?:\n .*)*)", re.MULTILINE)
 _IDEA = re.compile(r"(?:(?<=[.?!)] )|^)(?=\*\*[A-Z]\*\*)", re.MULTILINE)
@@ -32,7 +33,11 @@ def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
 
 
 def voted(cells: list[NotebookNode]) -> None:
-    """Turn the options of all polls in the cells of a lesson into buttons with explanations."""
+    """Turn the options of all polls in the cells of a lesson into buttons with explanations.
+
+    The cells with the buttons for JupyterLab are removed.
+    """
+    cells[:] = [cell for cell in cells if not VOTE.search(cell.source)]
     texts = [cell.source if cell.cell_type == "markdown" else "" for cell in cells]
     headings = [i for i, text in enumerate(texts) if text.startswith("#")] + [len(cells)]
     for k in headings[:-1]:

@@ -47,7 +47,8 @@ def configure() -> Path:
     }
     settings = {
         "ServerApp": server,
-        "LabApp": {"log_level": "ERROR", "custom_css": True},
+        # polls open their answers
+        "LabApp": {"log_level": "ERROR", "custom_css": True, "expose_app_in_browser": True},
         "KernelManager": {"transport_encryption": "auto"},
     }
     _write(folder / "jupyter_server_config.json", settings)

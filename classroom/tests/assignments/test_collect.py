@@ -306,12 +306,32 @@ def test_files_in_different_folders_belong_to_different_students(course, packing
     assert (found["anna_alt"], found["cy_1_2_x"]) == ("Anna Alt", "Cy_1_2_x")
 
 
+@pytest.mark.parametrize(
+    ("paths", "wanted"),
+    [
+        (["A/Al/ps1.ipynb", "A/Bo/ps1.ipynb", "B/Cy/ps1.ipynb", "B/Di/ps1.ipynb"], "al bo cy di"),
+        (["ps1/Al/ps1.ipynb", "ps1/Bo/ps1.ipynb"], "al bo"),
+        (["Al/ps1/ps1.ipynb", "Al/ps1/to_submit/ps1.ipynb"], "al"),
+        (["Al Li/Work/to_submit/ps1.ipynb"], "al_li"),
+        (["set/Al Li - ps1.ipynb", "set/Bo Ek - ps1.ipynb"], ""),
+        (["a/set/Al Li - ps1.ipynb", "a/set/Bo Ek - ps1.ipynb"], ""),
+        (["A/Al/ps1.ipynb", "B/Al/ps1.ipynb", "B/Bo/ps1.ipynb"], "al_a_al al_b_al bo"),
+        (["A/Al/x.ipynb", "A/Bo/x.ipynb", "B/Cy/x.ipynb"], "al bo cy"),
+        (["Al/ps1.pdf", "Bo/ps1.ipynb", "Cy/ps1.ipynb"], "bo cy"),
+    ],
+)
+def test_the_level_of_the_students_is_found(course, paths, wanted):
+    """A folder in which folders have notebooks of the same set belongs to a class."""
+    entries = {path: answered(course, path) if "ipynb" in path else b"" for path in paths}
+    assert sorted(students(course, entries, "loose")) == wanted.split()
+
+
 def test_folders_with_one_name_in_two_spellings_are_kept_apart(course):
     entries = {f"{name}/ps1.ipynb": answered(course, name) for name in ("Al Li", "al_li", "Li Al")}
     assert students(course, entries, "loose") == {
         "al_li_1": "Al Li",
         "li_al": "Li Al",
-        "al_li_3": "al_li",
+        "al_li_2": "al_li",
     }
 
 
@@ -362,6 +382,37 @@ def test_the_last_attempt_counts(course):
     assert files(course) == {"ek/ps1": "last", "al_li/ps1": "last"}
     assert of("late", rows)[0][1].startswith("handed in at 2026-12-03")
     assert len(of("late", rows)) == 1
+
+
+def test_users_of_blackboard_and_brightspace_are_kept_apart(course):
+    names = [
+        f"Set 1_{user}_attempt_2026-11-20-12-00-00" for user in ("an_smith", "jo_smith", "a.b")
+    ]
+    entries = {f"{name}_ps1.ipynb": answered(course, name) for name in names}
+    entries |= {
+        f"{names[0]}_z_a.b_attempt_2026-12-30-12-00-00_ps1.ipynb": answered(course, "spoof")
+    }
+    for number in ("101-99", "102-99"):
+        entries[f"{number} - Al Li - Dec 3, 2026 900 AM/ps1.ipynb"] = answered(course, number)
+    found = students(course, entries, "zip")
+    assert found.keys() == {"an_smith", "jo_smith", "a_b", "al_li_101_99", "al_li_102_99"}
+    assert found["a_b"] == names[2]
+
+
+def test_a_namesake_in_a_later_download_does_not_replace_the_first(course):
+    assert students(course, {moodle("Al Li_11"): answered(course, "11")}, "zip") == {"al_li": "11"}
+    (course.parents[1] / "downloads" / "all.zip").unlink()
+    found = students(course, {moodle("Al Li_22"): answered(course, "22")}, "loose")
+    assert found == {"al_li": "11", "al_li_22": "22"}
+
+
+def test_odd_dates_do_not_lose_a_file(course):
+    zipped = bytearray(packed({moodle("A_1"): answered(course), moodle("B_2"): answered(course)}))
+    at = zipped.index(b"PK\x01\x02")
+    zipped[at + 12 : at + 16] = bytes(4)  # a date of zero
+    odd = "x_ek_attempt_0001-01-01-00-00-00_ps1.ipynb"
+    collected(course, {"all.zip": bytes(zipped), odd: answered(course)})
+    assert files(course).keys() == {"a/ps1", "b/ps1", "ek/ps1"}
 
 
 def test_zips_in_zips_are_read_up_to_a_limit(course):

@@ -94,7 +94,7 @@ CLASS = [
         tamper,
         {"half": "half = 3"},
         "2 0",
-        ["is an earlier copy; the last one counts", "more"],
+        ["is a copy; another one counts", "more"],
     ),
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),

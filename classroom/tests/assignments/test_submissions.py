@@ -203,9 +203,26 @@ def in_question(notebook):
     answer["source"] = "YOUR ANSWER HERE"
 
 
-def copied(at, place, source=None):
+def added(place, cell):
+    return lambda notebook: notebook["cells"].insert(place, cell)
+
+
+def stubbed(at, stub):
+    return lambda notebook: notebook["cells"][at].update(source=stub)
+
+
+def blank_set_above(notebook):
+    """Put a set without answers above the student's, as a download into one file does."""
+    blank = copy.deepcopy(notebook["cells"])
+    for at, stub in ((SQUARE, SQUARE_STUB), (HALF, STUB), (WORDS, "YOUR ANSWER HERE")):
+        blank[at]["source"] = stub
+    notebook["cells"] = blank + notebook["cells"]
+
+
+def copied(at, place, source=None, kind=None):
     def change(notebook):
         twin = {**copy.deepcopy(notebook["cells"][at]), "id": "twin"}
+        twin["cell_type"] = kind or twin["cell_type"]
         notebook["cells"].insert(place, {**twin, "source": source or twin["source"]})
 
     return change
@@ -280,7 +297,11 @@ FOUND = {
     "split test": (split(SQUARE_TEST, "square(2)"), 0, ["was split"]),
     "copied stub": (copied(SQUARE, SQUARE + 1, SQUARE_STUB), 0, []),
     "copied test": (copied(SQUARE_TEST, SQUARE_TEST), 0, []),
-    "earlier copy": (copied(SQUARE, SQUARE, "def square(x): x + x"), 1, ["is an earlier copy"]),
+    "earlier copy": (
+        copied(SQUARE, SQUARE, "def square(x): x + x"),
+        1,
+        ["is a copy; another one counts"],
+    ),
     "function in an added cell below": (in_added_cell(SQUARE, SQUARE + 1, SQUARE_STUB), 0, [ADDED]),
     "function in an added cell above": (in_added_cell(SQUARE, SQUARE, SQUARE_STUB), 0, [ADDED]),
     "function in the last cell": (in_added_cell(SQUARE, 8, SQUARE_STUB), 0, [ADDED]),
@@ -300,6 +321,43 @@ FOUND = {
     ),
     "answers as Markdown": (made("markdown", SQUARE, HALF), 0, ["was made a markdown cell"] * 2),
     "answers as raw cells": (made("raw", SQUARE, WORDS), 0, ["was made a raw cell"] * 2),
+    "note that begins with a blank": (added(SQUARE + 1, markdown("  - a note")), 1, []),
+    "code that begins with blanks": (added(SQUARE + 1, code("  square(3)")), 1, []),
+    "marked note below": (copied(SQUARE, SQUARE + 1, "See above.", "markdown"), 1, ["is a copy"]),
+    "marked draft below": (copied(SQUARE, SQUARE + 1, "def square(x): 1", "raw"), 1, ["is a copy"]),
+    "marked scratch below": (copied(SQUARE, SQUARE + 1, "  square(3)"), 1, ["is a copy"]),
+    "changed copy of a test": (copied(SQUARE_TEST, SQUARE, "square(3)"), 1, ["is a copy"]),
+    "blank set above": (blank_set_above, 0, []),
+    "function quoted in a note": (
+        in_order(
+            in_added_cell(SQUARE, SQUARE + 1, SQUARE_STUB),
+            added(8, markdown("```\ndef square(x):\n    return 0\n```")),
+        ),
+        1,
+        [ADDED],
+    ),
+    "words as a note at the end": (
+        in_order(added(8, markdown("own")), copied(WORDS, 9, "a note")),
+        2,
+        ["is a copy"],
+    ),
+    "lambda in an added cell": (
+        in_order(added(SQUARE + 1, code("square = lambda x: x * x")), stubbed(SQUARE, SQUARE_STUB)),
+        0,
+        [ADDED],
+    ),
+    "stub without its comment": (
+        in_order(
+            in_added_cell(SQUARE, 8, "def square(x):\n    raise NotImplementedError()"),
+        ),
+        0,
+        [ADDED],
+    ),
+    "one mark lost, only answers kept": (
+        in_order(removed(0, 1, 3, 5, 6), lambda notebook: notebook["cells"][0].update(metadata={})),
+        0,
+        ["1 cells have lost", "each was missing"],
+    ),
     "test as a raw cell": (made("raw", SQUARE_TEST), 0, ["was made a raw cell; it is restored"]),
     "points": (marked(points=20), 0, ["has other points or marks; it is restored"]),
     "marks": (marked(grade=False), 0, ["has other points or marks; it is restored"]),
@@ -337,7 +395,8 @@ def check_found(release, content, added=0):
         name = grade_id(given)
         wanted = copy.deepcopy(given)
         wanted.source = GOOD.get(name, given.source)
-        assert found[name].source.split() == wanted.source.split(), name
+        lambda_ = name == "square-answer" and "lambda" in found[name].source
+        assert found[name].source.split() == wanted.source.split() or lambda_, name
         assert {**found[name], "source": ""} == {**wanted, "source": ""}
     assert len(notebook.cells) == len(original.cells) + added
     return notebook, remarks
@@ -382,6 +441,32 @@ def test_pictures_in_answers_are_kept(release):
     notebook, _ = restored(release, json.dumps(submitted(release, change)).encode())
     assert cell(notebook, "words-answer").source == "It is: \n2 × 2 > 0."
     assert cell(notebook, "words-answer").attachments.keys() == {"a.png", "b.png"}
+
+
+def test_pictures_with_one_name_and_in_other_cells_are_kept(release):
+    """JupyterLab names every pasted picture image.png."""
+
+    def change(notebook):
+        shown, words = "![x](attachment:image.png)", notebook["cells"][WORDS]
+        one, two = ({"image.png": {"image/png": each}} for each in ("AAAA", "BBBB"))
+        words["source"] = "YOUR ANSWER HERE"
+        notebook["cells"].append(markdown(f"one {shown}", attachments=one))
+        notebook["cells"].append(markdown(f"two {shown}", attachments=two))
+        question = notebook["cells"][QUESTION]
+        question["source"], question["attachments"] = f"{text(question)}\n\n{shown}", one
+
+    notebook, _ = restored(release, json.dumps(submitted(release, change)).encode())
+    words = cell(notebook, "words-answer")
+    names = re.findall(r"attachment:([\w.-]+)", words.source)
+    shown = [words.attachments[name]["image/png"] for name in names]
+    assert shown == ["AAAA", "AAAA", "BBBB"]
+
+
+def test_odd_pictures_are_left_out(release):
+    def change(notebook):
+        notebook["cells"][WORDS]["attachments"] = {"a.png": "x", "b.png": None}
+
+    check_found(release, json.dumps(submitted(release, change)).encode())
 
 
 def test_an_answer_in_the_cell_of_another_answer_counts(release):

@@ -94,6 +94,31 @@ def test_a_stored_lesson_is_complete_and_its_explorer_works(opened, page):
     expect(still).to_have_js_property("tagName", "IMG")
 
 
+def test_a_vote_opens_the_answer_and_shift_enter_passes_it(opened, page):
+    path = opened("01_plane", "votes")
+    ids = [cell.id for cell in nbformat.read(path, as_version=4).cells]
+    state = f"""(place) => {{
+      const notebook = {PANEL}.content;
+      return [notebook.activeCellIndex, notebook.widgets[place].isHidden];
+    }}"""
+    closed = ids.index("cell-12")
+    page.evaluate(f"{PANEL}.content.activeCellIndex = {ids.index('cell-01')}")
+    page.evaluate("jupyterapp.commands.execute('notebook:run-cell')")
+    page.get_by_text(IDLE).wait_for()
+    page.evaluate(f"{PANEL}.content.activeCellIndex = {ids.index('vote-1')}")
+    page.evaluate(f"{PANEL}.content.node.focus()")
+    page.keyboard.press("Shift+Enter")  # runs the cell with the buttons
+    votes = wait_for(page.get_by_role("group", name="Your vote"))
+    assert votes.get_by_role("button").all_inner_texts() == ["A", "B", "C", "D"]
+    page.keyboard.press("Shift+Enter")  # runs the heading of the answer
+    page.wait_for_function(f"{PANEL}.content.activeCellIndex == {ids.index('cell-16')}")
+    assert page.evaluate(state, closed) == [ids.index("cell-16"), True]
+    votes.get_by_role("button", name="B").click()
+    page.wait_for_function(f"!{PANEL}.content.widgets[{closed}].isHidden")
+    assert votes.locator("[aria-pressed=true]").all_inner_texts() == ["B"]
+    assert page.evaluate(state, ids.index("cell-28"))[1]  # the next answer is still closed
+
+
 def settled(page, text):
     """Wait until the kernel is idle and no more pictures arrive; return the text."""
     now = None

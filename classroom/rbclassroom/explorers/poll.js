@@ -1,0 +1,44 @@
+// The buttons of a poll. In JupyterLab a choice opens the answer below, and Shift+Enter passes a closed answer.
+const guarded = new WeakSet();
+
+function guard(notebook) {
+  if (!notebook?.activeCellChanged || guarded.has(notebook)) return;
+  guarded.add(notebook);
+  notebook.activeCellChanged.connect(() => {
+    const open = notebook.widgets.findIndex((cell, at) => at >= notebook.activeCellIndex && !cell.isHidden);
+    if (open > notebook.activeCellIndex) notebook.activeCellIndex = open;
+  });
+}
+
+function open(from) {
+  let cell = from.closest(".jp-Cell");
+  do cell = cell?.nextElementSibling; while (cell && !cell.querySelector(":is(h1, h2, h3)"));
+  const answer = cell?.querySelector("h3")?.textContent.startsWith("Answer to") ? cell : null;
+  answer?.querySelector(".jp-showHiddenCellsButton")?.click();
+  return Boolean(answer);
+}
+
+export default {
+  render({ model, el }) {
+    guard(window.jupyterapp?.shell.currentWidget?.content);
+    const said = document.createElement("span");
+    said.setAttribute("role", "status");
+    const buttons = model.get("letters").map((letter) => {
+      const button = document.createElement("button");
+      button.className = "jupyter-widgets jupyter-button widget-button";
+      button.style.width = "4em";
+      button.textContent = letter;
+      button.onclick = () => {
+        buttons.forEach((each) => {
+          each.classList.toggle("mod-info", each === button);
+          each.setAttribute("aria-pressed", each === button);
+        });
+        said.textContent = open(el) ? "" : " The answer is below.";
+      };
+      return button;
+    });
+    el.setAttribute("role", "group");
+    el.setAttribute("aria-label", "Your vote");
+    el.append(...buttons, said);
+  },
+};
