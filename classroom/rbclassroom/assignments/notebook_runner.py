@@ -63,7 +63,7 @@ class BoundedClient(NotebookClient):
             self._at, self.raise_on_iopub_timeout, self._room = cell_index, False, dict(ROOM)
         kind, content = msg["msg_type"], msg["content"]
         if kind == "error" and content["ename"] == "StdinNotImplementedError":
-            why = "nobody can answer input() here; write the value into the code"
+            why = "input() has no answer here; write the value into the code"
             content |= {"ename": "EOFError", "evalue": why, "traceback": [why]}
         if kind == "error":
             content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}

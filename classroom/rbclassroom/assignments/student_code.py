@@ -9,7 +9,7 @@ from typing import Any
 class NotYet(AssertionError):
     """An error with a message for the student, which a notebook shows without a traceback.
 
-    If the message is a hint, `case` says what the function should return, and what it returns.
+    If the message is a hint, `case` is an example: the right result, and that of the function.
     """
 
     def __init__(self, message: str, case: str = "") -> None:
