@@ -31,6 +31,7 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     | {"rbclassroom.course", "rbclassroom.figures"},
     "rbclassroom.atlas": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
     "rbclassroom.rivals": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
+    "rbclassroom.polls": set(),
     "rbclassroom.course": {"rbcourse", "rbclassroom"},
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
     "rbclassroom.lecture": {"rbcourse", "rbcourse.draw"}
@@ -53,6 +54,7 @@ LIBRARIES = {
     "rbclassroom.figures": {"matplotlib"},
     "rbclassroom.atlas": {"threadpoolctl"},
     "rbclassroom.rivals": set(),
+    "rbclassroom.polls": {"anywidget", "traitlets"},
     "rbclassroom.course": {"PIL", "jupyterlab", "nbclient", "nbformat", "tornado"},
     "rbclassroom.lecture": {"PIL", "markdown_it", "mdit_py_plugins", "nbformat"}
     | {"segno", "tornado"},

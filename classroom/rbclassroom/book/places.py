@@ -14,6 +14,7 @@ CLASSROOM = [
     "figures",
     "atlas",
     "rivals",
+    "polls",
     "course",
     "lecture",
     "assignments",

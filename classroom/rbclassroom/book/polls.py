@@ -4,7 +4,7 @@ import re
 
 from nbformat import NotebookNode
 
-VOTE = re.compile(r"^explorers\.poll\(", re.MULTILINE)  # in a cell with buttons for JupyterLab
+VOTE = re.compile(r"^polls\.buttons\(", re.MULTILINE)  # in a cell with buttons for JupyterLab
 _OPTION = re.compile(r"^- \*\*([A-Z])\*\* · (.*)$", re.MULTILINE)
 _ITEM = re.compile(r"^- (?=\*\*[A-Z]\*\*)(.*(?:\n .*)*)", re.MULTILINE)
 _IDEA = re.compile(r"(?:(?<=[.?!)] )|^)(?=\*\*[A-Z]\*\*)", re.MULTILINE)

@@ -1,4 +1,4 @@
-"""The explorers of the lessons: pictures that readers change with sliders; and polls.
+"""The explorers of the lessons: pictures that readers change with sliders.
 
 | lesson | explorer | | lesson | explorer |
 |---|---|---|---|---|
@@ -17,7 +17,6 @@ from rbclassroom.explorers.curves import flip_explorer, screw_explorer, theta_ex
 from rbclassroom.explorers.optima import cube_explorer, minimum_acceleration_explorer
 from rbclassroom.explorers.paths import chain_explorer, spline_explorer
 from rbclassroom.explorers.plane import arm_explorer, planar_explorer
-from rbclassroom.explorers.polls import poll
 from rbclassroom.explorers.rotations import projection_explorer, random_explorer, rotation_explorer
 from rbclassroom.explorers.smoothing import smoothing_explorer
 from rbclassroom.explorers.timing import timing_explorer
@@ -30,7 +29,6 @@ __all__ = [
     "flip_explorer",
     "minimum_acceleration_explorer",
     "planar_explorer",
-    "poll",
     "projection_explorer",
     "random_explorer",
     "rotation_explorer",

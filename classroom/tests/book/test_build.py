@@ -12,6 +12,7 @@ import pytest
 from rbclassroom.assignments.handout import LEFTOVER
 from rbclassroom.book import build, reference
 from rbclassroom.book.places import CONTENTS
+from rbclassroom.book.polls import VOTE
 from rbclassroom.course.ledger import MISPRINTS, WHAT
 from rbclassroom.course.notebooks import lesson_paths
 
@@ -192,6 +193,9 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path, monkeypatch):
 def test_the_page_of_a_lesson_omits_only_the_run_sheet(path, source):
     stored = nbformat.read(path, as_version=4).cells
     cells = nbformat.reads(source(f"lessons/{path.name}"), as_version=4).cells
+    stored = [
+        cell for cell in stored if not VOTE.search(cell.source)
+    ]  # in pages, options are buttons
     code, page_code = ([x.source for x in y if x.cell_type == "code"] for y in (stored, cells))
     first = next(i for i, cell in enumerate(stored) if cell.source.startswith("## "))
     imports = sum(cell.cell_type == "code" for cell in stored[:first])

@@ -226,3 +226,18 @@ def test_each_explorer_has_units_and_large_letters(name):
     chosen = [explorer.steps[i] for i in np.linspace(0, explorer.play.max, 5).astype(int)]
     states = [explorer.state(**{explorer.plays: value}) for value in chosen]
     assert len({state.drawn.tobytes() for state in states}) >= 4
+
+
+@pytest.mark.parametrize("path", LESSONS[1:], ids=lambda path: path.stem)
+def test_every_poll_has_a_button_for_each_option_above_its_answer(path):
+    cells, open_ = nbformat.read(path, as_version=4).cells, None
+    for above, cell in zip(cells, cells[1:], strict=False):
+        if asked := re.match(r"### Poll (\d+)", above.source):
+            letters = "".join(re.findall(r"^- \*\*([A-Z])\*\*", above.source, re.MULTILINE))
+            open_ = f"### Answer to poll {asked[1]}"
+        if cell.source.startswith("### Answer to poll"):
+            assert cell.source == open_
+            assert above.source.splitlines()[-1] == f'polls.buttons("{letters}")'
+            space = {}
+            exec(above.source, space)
+            assert space["polls"].buttons(letters).letters == list(letters)

@@ -24,6 +24,6 @@ class Poll(anywidget.AnyWidget):
         return f"poll: {', '.join(self.letters)}"
 
 
-def poll(letters: str) -> Poll:
-    """Return the buttons of a poll, such as ``poll("ABC")``, for the cell above its answer."""
+def buttons(letters: str) -> Poll:
+    """Return the buttons of a poll, such as ``buttons("ABC")``, for the cell above its answer."""
     return Poll(letters=list(letters))
