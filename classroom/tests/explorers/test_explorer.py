@@ -4,6 +4,7 @@ import io
 import json
 import re
 import warnings
+from itertools import pairwise
 from pathlib import Path
 
 import ipywidgets
@@ -231,7 +232,7 @@ def test_each_explorer_has_units_and_large_letters(name):
 @pytest.mark.parametrize("path", LESSONS[1:], ids=lambda path: path.stem)
 def test_every_poll_has_a_button_for_each_option_above_its_answer(path):
     cells, open_ = nbformat.read(path, as_version=4).cells, None
-    for above, cell in zip(cells, cells[1:], strict=False):
+    for above, cell in pairwise(cells):
         if asked := re.match(r"### Poll (\d+)", above.source):
             letters = "".join(re.findall(r"^- \*\*([A-Z])\*\*", above.source, re.MULTILINE))
             open_ = f"### Answer to poll {asked[1]}"
