@@ -16,6 +16,7 @@ import numpy as np
 from rbclassroom.assignments.student_code import NotYet, call_student
 from rbcourse import Array
 
+SHOWN = 16  # larger arrays are described by their shape
 IN_RADIANS = (
     "Angles are in radians here, and NumPy's functions take and return radians: convert nothing."
 )
@@ -141,8 +142,14 @@ class Problem:
         if not np.isfinite(numbers).all():
             why = "Does it divide by 0, or take a root or an arccos of a number without one?"
             return f"{called} your result is not finite: {show(numbers)}. {why}"
-        text = f"{called} the result should be {show(wanted)}; yours is {show(numbers)}"
-        return f"{text}, off by {np.abs(numbers - wanted).max(initial=0):.1g}."
+        off = np.abs(numbers - wanted)
+        entry = "the result"
+        if wanted.size > SHOWN:
+            worst = np.unravel_index(int(off.argmax()), off.shape)
+            entry = f"entry {[int(at) for at in worst]} of the result"
+            wanted, numbers = wanted[worst], numbers[worst]
+        text = f"{called} {entry} should be {show(wanted)}; yours is {show(numbers)}"
+        return f"{text}, off by {off.max(initial=0):.1g}."
 
 
 @dataclass(frozen=True)
@@ -237,7 +244,7 @@ def as_numbers(value: Any) -> Array | None:
 
 def show(value: Any) -> str:
     """Return a short text: the rounded entries of a small array, or the shape of a large one."""
-    if isinstance(value, np.ndarray) and value.size > 16:
+    if isinstance(value, np.ndarray) and value.size > SHOWN:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]
 

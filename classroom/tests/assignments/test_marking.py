@@ -90,6 +90,14 @@ def test_hints_are_followed_by_an_example():
     assert " ".join(shown[2:]) == refused.value.case
 
 
+def test_the_worst_entry_of_a_large_result_is_shown():
+    many = np.arange(40.0).reshape(20, 2)
+    problem = Problem(["m"], [(many,)], [many])
+    source = "def answer(m):\n    m = m.copy()\n    m[3, 1] = 0.25\n    return m"
+    wanted = "entry [3, 1] of the result should be 7.0; yours is 0.25, off by 7."
+    assert wanted in told(problem, source)
+
+
 def test_full_turns_are_ignored_if_the_problem_says_so():
     x = np.array([1.0, 2.0])
     problem = Problem(["x"], [(x,)], [x], angles=[1])

@@ -108,7 +108,8 @@ def test_a_vote_opens_the_answer_and_shift_enter_passes_it(opened, page):
     page.evaluate(f"{PANEL}.content.activeCellIndex = {ids.index('vote-1')}")
     page.evaluate(f"{PANEL}.content.node.focus()")
     page.keyboard.press("Shift+Enter")  # runs the cell with the buttons
-    votes = wait_for(page.get_by_role("group", name="Your vote"))
+    votes = page.get_by_role("group", name="Your vote")
+    votes.wait_for()
     assert votes.get_by_role("button").all_inner_texts() == ["A", "B", "C", "D"]
     page.keyboard.press("Shift+Enter")  # runs the heading of the answer
     page.wait_for_function(f"{PANEL}.content.activeCellIndex == {ids.index('cell-16')}")

@@ -25,6 +25,7 @@ from rbclassroom.assignments.collect import collect
 from rbclassroom.assignments.grade import grade
 from rbclassroom.assignments.handout import release
 from rbclassroom.book.lessons import joined
+from rbclassroom.book.polls import VOTE
 from rbclassroom.book.serve import Handler
 from rbclassroom.live import engine
 from rbclassroom.live.pages import LEFT_OUT
@@ -101,7 +102,7 @@ def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
     cells = [cell for cell in joined(notebook.cells) if cell.cell_type == "code"]
     differ = set()
     for at, cell in enumerate(cells):
-        if "_explorer(" in cell.source:
+        if "_explorer(" in cell.source or VOTE.search(cell.source):  # they need Jupyter
             continue
         if listed.get(cell.id, "").startswith("takes"):
             differ.add(cell.id)
@@ -145,7 +146,8 @@ def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
                 # only the first sampler makes as many draws as a student's sampler
                 if "law" in TABLES[name][slug]:
                     visible = "\n".join([visible.split("assert")[0], *fewer])
-                if ["hint", mistake["hint"]] not in found:
+                hints = [text for kind, text in found if kind == "hint"]
+                if not hints or not hints[0].startswith(mistake["hint"]):  # an example follows
                     missed[slug, mistake["hint"]] = found
     assert missed == {}
 
@@ -292,7 +294,7 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
     original.parent.mkdir()
     files = release("ps1", tmp_path / "course")
     original.write_bytes(files["ps1.ipynb"])
-    (tmp_path / "ps1.json").write_bytes(files["ps1.json"])
+    (original.parent / "ps1.json").write_bytes(files["ps1.json"])
     submitted = check(tmp_path / "ps1.ipynb")
     assert "7 of 7 visible tests passed" in capsys.readouterr().out
     uploaded = tmp_path / "downloads" / "Ada Lovelace_123_assignsubmission_file" / "ps1.ipynb"
