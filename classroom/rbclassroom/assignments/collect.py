@@ -53,12 +53,8 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     files = list(find_files(folder))
     found = ["" if file.kind else _set_of(file, sets) for file in files]
     for file, name, about in zip(files, found, find_owners(files, found), strict=True):
-        why = (
-            _mismatch(name, about, sets)
-            if about
-            else "neither its name nor a folder names a student"
-        )
-        why = file.why or why
+        why = "neither its name nor a folder names a student"
+        why = file.why or (_mismatch(name, about, sets) if about else why)
         if about and not why:
             prepared = "/to_submit/" in f"/{about['file']}"
             place, first = (about["date"], prepared, file.label), int(about["number"] or 0)
@@ -68,10 +64,9 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
             continue
         rows.append((file.kind or "unmatched", file.label, why))
         if about:
-            who = f"{about['name']} {about['id']}".strip()
-            unused[who].append(f"{file.label}: {why}")
+            unused[_label(about)].append(f"{file.label}: {why}")
     for uploads in groups.values():
-        unused.pop(f"{uploads[0].about['name']} {uploads[0].about['id']}".strip(), None)
+        unused.pop(_label(uploads[0].about), None)
     rows += [("nothing usable", who, "; ".join(reasons)) for who, reasons in sorted(unused.items())]
     numbers = defaultdict[tuple[str, str], list[str]](list)
     for name, student, number in sorted(groups):
@@ -80,10 +75,8 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     before: dict[str, str] = json.loads(stored.read_text("utf-8")) if stored.exists() else {}
     for (name, student), several in numbers.items():
         if len(several) > 1 and (submitted / student / name).exists():
-            why = (
-                f"{len(several)} students have this name, and now numbered folders; delete this one"
-            )
-            rows.append(("duplicates", f"submitted/{student}/{name}", why))
+            why = "students have this name, and now numbered folders; delete this one"
+            rows.append(("duplicates", f"submitted/{student}/{name}", f"{len(several)} {why}"))
     for (name, student, number), uploads in sorted(groups.items()):
         *others, best = sorted(uploads, key=lambda upload: upload[:4])
         same, who = numbers[name, student], student
@@ -113,6 +106,11 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     write_whole(stored, json.dumps(before).encode())
     write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": ""}])
     return rows
+
+
+def _label(about: dict[str, str]) -> str:
+    """Return how a student is listed: the folder, or the name and the number in the LMS."""
+    return about["folder"] or f"{about['name']} {about['id']}".strip()
 
 
 def _read_sets(assignments: Path) -> dict[str, list[NotebookNode]]:

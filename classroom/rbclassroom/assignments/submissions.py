@@ -9,6 +9,7 @@ student in a locked cell gets a cell of its own. The check and the grading use t
 import copy
 import json
 import re
+import warnings
 from collections import defaultdict
 from typing import Any
 
@@ -136,8 +137,9 @@ def _defines(cell: NotebookNode, given: NotebookNode) -> bool:
 def _is_code(text: str) -> bool:
     """Tell whether a text is complete Python; lines for IPython count as Python."""
     try:
-        compile(re.sub(r"^([ \t]*)[%!].*", r"\1pass", text, flags=re.MULTILINE), "", "exec")
-    except (SyntaxError, ValueError):
+        with warnings.catch_warnings(action="ignore"):  # as for "\\d" in a text
+            compile(re.sub(r"^([ \t]*)[%!].*", r"\1pass", text, flags=re.MULTILINE), "", "exec")
+    except (MemoryError, RecursionError, SyntaxError, ValueError):
         return False
     return True
 
@@ -203,16 +205,14 @@ class _Restoring:
         """Join an added cell that begins in the middle of a function with the cell above."""
         for cell in reversed(self.cells[1:]):
             above = self.cells[self.place(cell) - 1]
-            free = not grade_id(above) or is_answer(self.wanted[grade_id(above)])
-            code = above.cell_type == cell.cell_type == "code"
+            name = grade_id(above)
+            free = not grade_id(cell) and (not name or is_answer(self.wanted[name]))
             begun = re.match(r"\n*[ \t]+\S", cell.source)
-            whole = _is_code(f"{above.source}\n{cell.source}")
-            if free and code and begun and whole and not grade_id(cell):
+            code = above.cell_type == cell.cell_type == "code"
+            if free and begun and code and _is_code(f"{above.source}\n{cell.source}"):
                 _fill(above, [above, cell], "\n")
                 del self.cells[self.place(cell)]
-                self.changes.append(
-                    (grade_id(above) or above.id, "was split; its parts are joined")
-                )
+                self.changes.append((name or above.id, "was split; its parts are joined"))
 
     def join_copies(self, name: str) -> None:
         """Let one cell have each name: a split cell is joined, and of copies the last one counts.
@@ -223,13 +223,11 @@ class _Restoring:
         if len(copies) < 2:
             return
         given, order = self.wanted[name], list(self.wanted)
+        above = order[: order.index(name)][-1:]  # the name of the cell above, in the original
         filled = [cell for cell in copies if not self.is_empty(cell)]
         same = [cell for cell in filled if cell.cell_type == given.cell_type] or filled
-        before = order[: order.index(name)][
-            -1:
-        ]  # the cell above, whose name is also above an answer
         liked = [cell for cell in same if _defines(cell, given)]
-        liked = liked or [cell for cell in same if self.names()[: self.place(cell)][-1:] == before]
+        liked = liked or [cell for cell in same if self.names()[: self.place(cell)][-1:] == above]
         best = (liked or same or copies)[-1]
         if not is_answer(given) and len(filled) < len(copies):
             best = [cell for cell in copies if self.is_empty(cell)][-1]  # it was not changed

@@ -464,6 +464,14 @@ def test_students_who_handed_in_nothing_usable_are_listed(course):
     assert files(course).keys() == {"e/ps1"}
 
 
+def test_a_namesake_without_a_notebook_is_listed(course):
+    entries = {"A/Al/ps1.pdf": b"%PDF-1.7", "A/Bo/ps1.ipynb": answered(course)}
+    entries |= {f"B/{name}/ps1.ipynb": answered(course) for name in ("Al", "Cy")}
+    rows = collected(course, entries | {"A/Di/ps1.ipynb": answered(course)})
+    assert [who for who, _ in of("nothing usable", rows)] == ["A/Al"]
+    assert files(course).keys() == {f"{who}/ps1" for who in ("al", "bo", "cy", "di")}
+
+
 @pytest.mark.parametrize("method", [zipfile.ZIP_LZMA, zipfile.ZIP_BZIP2])
 def test_other_kinds_of_compression_are_refused_one_by_one(course, method):
     """A short file in bzip2 can hold gigabytes."""

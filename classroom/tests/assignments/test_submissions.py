@@ -469,6 +469,14 @@ def test_odd_pictures_are_left_out(release):
     check_found(release, json.dumps(submitted(release, change)).encode())
 
 
+def test_a_very_deep_cell_is_kept(release):
+    """Python raises RecursionError or MemoryError for it, not SyntaxError."""
+    text = "    x = " + "a." * 10**5 + "a"
+    content = json.dumps(submitted(release, added(SQUARE + 1, code(text)))).encode()
+    notebook, remarks = check_found(release, content, added=1)
+    assert (notebook.cells[SQUARE + 1].source, remarks) == (text, [])
+
+
 def test_an_answer_in_the_cell_of_another_answer_counts(release):
     """The empty answer would define the function again, without its text."""
 
