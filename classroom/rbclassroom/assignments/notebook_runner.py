@@ -17,6 +17,9 @@ ROOM = {"stream": 100_000, "data": 2_000_000}  # limits for a cell's outputs, in
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
 CUT = "the output is too large, and the rest is left out"
+NO_INPUT = "StdinNotImplementedError"  # the error of ipykernel, with a long traceback
+_WHY = "input() has no answer here; write the value into the code"
+ASKED = {"ename": "EOFError", "evalue": _WHY, "traceback": [_WHY]}
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
 
@@ -62,10 +65,8 @@ class BoundedClient(NotebookClient):
         if cell_index != self._at:
             self._at, self.raise_on_iopub_timeout, self._room = cell_index, False, dict(ROOM)
         kind, content = msg["msg_type"], msg["content"]
-        if kind == "error" and content["ename"] == "StdinNotImplementedError":
-            why = "input() has no answer here; write the value into the code"
-            content |= {"ename": "EOFError", "evalue": why, "traceback": [why]}
         if kind == "error":
+            content |= ASKED if content["ename"] == NO_INPUT else {}
             content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
             content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
         elif kind == "stream" or kind in DISPLAYS:
@@ -101,6 +102,7 @@ class BoundedClient(NotebookClient):
             cell.outputs = [out for out in cell.outputs if out.output_type != "execute_result"]
             empty = {"ename": "Error", "evalue": "the cell was not run", "traceback": []}
             error = {key: reply.get(key, value) for key, value in empty.items()}
+            error = ASKED if error["ename"] == NO_INPUT else error
             if not any(out.get("ename") == error["ename"] for out in cell.outputs):
                 cell.outputs.append(new_output("error", **error))
         if cell_index in self.cut:

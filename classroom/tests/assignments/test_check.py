@@ -148,6 +148,15 @@ def test_an_endless_loop_and_a_dead_kernel_are_reported(hand_in, capsys, endless
     assert (path.parent / "to_submit" / "ps0.ipynb").stat().st_size < 3_000_000
 
 
+def test_exit_and_input_are_reported_in_their_cells(hand_in, capsys):
+    check.check(hand_in(square="def square(x):\n    return x * x\ninput()", half="exit()"))
+    said = capsys.readouterr().out
+    assert "the kernel died in cell 5: the code called exit" in said
+    path = hand_in(square="def square(x):\n    return x * int(input())")
+    check.check(path)
+    assert "input() has no answer here" in capsys.readouterr().out
+
+
 @pytest.mark.skipif(os.name == "nt", reason="interrupts are not signals on Windows")
 def test_a_cell_that_cannot_be_interrupted_ends_the_run(hand_in, capsys, endless):
     stuck = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"

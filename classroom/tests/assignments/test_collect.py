@@ -15,6 +15,7 @@ from nbgrader.utils import parse_utc
 from tiny import MODULE
 from tiny_set import write_tiny_set
 
+from rbclassroom.assignments import downloads
 from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.collect import collect
 from rbclassroom.assignments.submissions import read_notebook
@@ -423,6 +424,36 @@ def test_zips_in_zips_are_read_up_to_a_limit(course):
         content = packed({"w.zip": content})
     assert files(course).keys() == {"a/ps1", "b/ps1", "c/ps1"}
     assert "too many zips" in of("refused", rows)[-1][1]
+
+
+def test_the_name_of_a_class_zip_can_look_like_an_upload(course):
+    collected(course, {"ROB_3_01_all.zip": packed({"ek_5_6_ps1.ipynb": answered(course)})})
+    assert list(files(course)) == ["ek_5/ps1"]
+
+
+def test_a_folder_with_some_names_as_in_canvas_belongs_to_one_student(course):
+    names = "hw_1_2_ps1.ipynb", "hw_3_4_ps1.ipynb", "ps1.ipynb"
+    entries = {f"{who}/{name}": answered(course) for who in ("Al", "Bo") for name in names}
+    assert students(course, entries, "loose").keys() == {"al", "bo"}
+
+
+def test_a_zip_that_declares_a_smaller_size_is_refused(course, monkeypatch):
+    monkeypatch.setattr(downloads, "UPLOAD_BYTES", 10_000)
+    inner = packed({"a.txt": bytes(6000), "b.txt": bytes(6000)}, method=zipfile.ZIP_DEFLATED)
+    inner = bytearray(inner)
+    at = -1
+    while (at := inner.find(b"PK\x01\x02", at + 1)) >= 0:
+        inner[at + 24 : at + 28] = (100).to_bytes(4, "little")
+    rows = collected(course, {"all.zip": packed({moodle("A_1", "w.zip"): bytes(inner)})})
+    assert len(of("refused", rows)) >= 1
+
+
+def test_a_student_of_the_roster_keeps_the_folder_with_another_number(course):
+    (course / "students.csv").write_text("id,first_name,last_name\ns1,Al,Li\n")
+    for number in "11", "22":
+        found = students(course, {moodle(f"Al Li_{number}"): answered(course, number)}, "loose")
+        (course.parents[1] / "downloads" / f"{moodle(f'Al Li_{number}')}").unlink()
+        assert found.keys() == {"s1"}
 
 
 def test_notebooks_without_marks_are_collected(course):

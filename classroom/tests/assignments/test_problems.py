@@ -5,10 +5,12 @@ import contextlib
 import functools
 import re
 import shutil
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 from textwrap import indent
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import nbformat
@@ -101,6 +103,15 @@ def test_wrong_answers_get_their_hints(name, slug):
                 judge.accepts(space[function], *seed)
             assert str(told.value) == mistake["hint"], code
             judge = replace(judge, draws=8000) if seed else judge
+
+
+def test_a_change_of_the_folder_does_not_hide_the_data(monkeypatch, tmp_path):
+    """The code of a student may leave the folder in which its kernel was started."""
+    update(SOURCE / "ps1")
+    shell = SimpleNamespace(starting_dir=str(SOURCE / "ps1"))
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    monkeypatch.chdir(tmp_path)
+    assert problem("ps1", "seen").names == ["pose", "point"]
 
 
 @problems

@@ -359,6 +359,7 @@ FOUND = {
         ["1 cells have lost", "each was missing"],
     ),
     "test as a raw cell": (made("raw", SQUARE_TEST), 0, ["was made a raw cell; it is restored"]),
+    "half of a locked text": (stubbed(IMPORTS, "import math\n\nimport math"), 0, [CHANGED]),
     "points": (marked(points=20), 0, ["has other points or marks; it is restored"]),
     "marks": (marked(grade=False), 0, ["has other points or marks; it is restored"]),
     "moved to the end": (moved, 0, ["not in the order"]),
@@ -399,6 +400,7 @@ def check_found(release, content, added=0):
         assert found[name].source.split() == wanted.source.split() or lambda_, name
         assert {**found[name], "source": ""} == {**wanted, "source": ""}
     assert len(notebook.cells) == len(original.cells) + added
+    assert not any("\r" in each.source for each in notebook.cells)
     return notebook, remarks
 
 
@@ -601,3 +603,8 @@ BROKEN += [b'{"cells": [{"source": [3]}]}', b'{"nbformat": 4', b"\x00" * 100, b"
 def test_files_without_a_notebook_are_refused(content, said):
     with pytest.raises(Refused, match=f"^my.ipynb is {said}"):
         read_notebook(content, "my.ipynb")
+
+
+def test_ends_of_lines_of_all_systems_are_read():
+    content = json.dumps({"cells": [{"source": "a\r\nb\rc\n\nd"}]}).encode()
+    assert read_notebook(content, "it").cells[0].source == "a\nb\nc\n\nd"
