@@ -120,13 +120,17 @@ class Sources:
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
             drawing = decks[path.stem].shown[0].picture
-            sheet = lessons.prepared(notebook, path.name, self.root, known, where, drawing)
+            lessons.prepare(notebook, path.name, self.root, known, where)
             lessons.add_buttons(notebook, path.name, self.repository)
             if self.live:
                 pages.mark_lesson(notebook, path.stem)
             self.put(page, nbformat.writes(notebook))
-            if sheet:
-                self.put(f"teach/{path.stem}.md", f"# Run sheet: {title}\n\n{sheet}\n")
+            if sheet := decks[path.stem].sheet:
+                text = f"# Run sheet: {title}\n\n{sheet}\n"
+                self.put(
+                    f"teach/{path.stem}.md",
+                    relinked(text, f"notebooks/{path.name}", f"teach/{path.stem}.md"),
+                )
             row = re.search(rf"^\| \[.*\]\(.*{path.name}\) \| (.*) \| (.*) \|$", readme, re.M)
             question, minutes = row.groups() if row else ("", "")
             shown.append(

@@ -1,7 +1,6 @@
 """A stored lesson as a page of the book.
 
-The page begins with a picture. Readers can answer its polls, and open its folded code and answers.
-Stored outputs are kept. The run sheet becomes a page of its own.
+Readers can answer its polls, and open its folded code and answers. Stored outputs are kept.
 """
 
 import base64
@@ -20,7 +19,7 @@ from PIL import Image
 from rbclassroom.book.citations import listed, names, with_citations
 from rbclassroom.book.places import relinked, with_keys
 from rbclassroom.book.polls import voted
-from rbclassroom.course.notebooks import lesson_paths, shown_figures, split_sheet
+from rbclassroom.course.notebooks import lesson_paths, shown_figures
 from rbclassroom.explorers import recorded
 from rbcourse.draw.display import ENGINE
 from rbcourse.draw.save import caption
@@ -32,7 +31,7 @@ _PLAYER = re.compile(
 )
 _DATA = re.compile(r'<script type="application/json">(.*?)</script>', re.DOTALL)
 _SAVED = re.compile(r"save_(figure|animation)\(|\.save\(\)")
-_SHEET = re.compile(r"; the lecturer's (run sheets?) (?:is|are) at the end")
+_TIME = re.compile(r"^(\| Time \| .*) \|$", re.MULTILINE)
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
 _LESSON = re.compile(r"`[^`]*`|\$[^$]*\$|\[[^\]]*\]\([^)]*\)|<[^>]*>|\b(lesson (\d+))\b")
 _EXPLORER = re.compile(r"explorers\.(\w+)_explorer\(\)")
@@ -179,16 +178,10 @@ def with_files(shown: str) -> str:
     return _FILES.sub(put, shown)
 
 
-def with_lead(text: str, picture: str) -> str:
-    """Return the first cell of a lesson with a picture after the question."""
-    question, table, rest = text.partition("\n| | |\n")
-    return f'{question}\n<figure class="lead">{picture}</figure>\n{table}{rest}'
-
-
 def in_order(cells: list[NotebookNode]) -> list[NotebookNode]:
     """Return cells with the imports moved from the start of the lesson to its end."""
     first = next((i for i, cell in enumerate(cells) if cell.source.startswith("## ")), len(cells))
-    imports = [cell for cell in cells[:first] if cell.cell_type == "code"]
+    imports = [c for c in cells[:first] if c.cell_type == "code" and not c.outputs]
     others = [cell for cell in cells if not any(cell is each for each in imports)]
     for cell in imports:
         cell.metadata.tags = [*cell.metadata.get("tags", []), "imports"]
@@ -218,30 +211,29 @@ def hide_code(cells: list[NotebookNode]) -> None:
             cell.metadata.tags = [*cell.metadata.get("tags", []), "hide-input"]
 
 
-def prepared(
-    notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path, lead: str
-) -> str:
-    """Prepare the notebook of a lesson for the book, and return its run sheet.
+def prepare(
+    notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path
+) -> None:
+    """Prepare the notebook of a lesson for the book.
 
-    The pictures become files, see `with_picture_files`. `lead` is the drawing at the beginning.
+    The pictures become files, see `with_picture_files`.
     """
-    path, page, sheet_page = f"notebooks/{name}", f"lessons/{name}", f"teach/{Path(name).stem}.md"
+    path, page, sheet = f"notebooks/{name}", f"lessons/{name}", f"../teach/{Path(name).stem}.md"
     lessons = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
     works = names((root / "notebooks" / "REFERENCES.bib").read_text("utf-8"))
-    cells, sheet = split_sheet(notebook)
+    cells = notebook.cells
     here = {key for cell in cells for key in listed(cell.source)}
 
     def to_lesson(match: re.Match[str]) -> str:
         found = lessons.get(int(match[2] or -1))
         return f"[{match[1]}]({found})" if found else match[0]
 
-    cells[0].source = with_lead(cells[0].source, lead)
     for cell in cells:
         if cell.cell_type == "markdown":
             lines = cell.source.split("\n")
             keyed = [with_keys(x, page) if x.startswith("<small>") else x for x in lines]
             text = relinked(_LESSON.sub(to_lesson, "\n".join(keyed)), path, page)
-            text = _SHEET.sub(rf" · [\1 for lecturers](../{sheet_page})", text)
+            text = _TIME.sub(rf"\1 · [run sheet for lecturers]({sheet}) |", text)
             cell.source = with_citations(text, works, here, "../references.html")
             continue
         explorer = _EXPLORER.search(cell.source)
@@ -255,7 +247,6 @@ def prepared(
     voted(cells)
     notebook.cells = folded(joined(in_order(cells)))
     hide_code(notebook.cells)
-    return relinked(sheet, path, sheet_page)
 
 
 def add_buttons(notebook: NotebookNode, name: str, repository: str) -> None:

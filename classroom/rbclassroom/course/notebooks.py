@@ -31,7 +31,6 @@ OPENED = {
         "version": platform.python_version(),
     },
 }
-SHEET = "## Run sheet for the lecturer"
 
 
 def lesson_paths(folder: Path) -> list[Path]:
@@ -44,15 +43,6 @@ def shown_figures(cell: NotebookNode) -> dict[str, str]:
     texts = [output.get("data", {}).get("text/plain", "") for output in cell.outputs]
     figures = (re.fullmatch(r"((?:lesson\d\d|paper|report)_\w+): (.+)", text) for text in texts)
     return {figure[1]: figure[2] for figure in figures if figure}
-
-
-def split_sheet(notebook: NotebookNode) -> tuple[list[NotebookNode], str]:
-    """Return the cells for the class, and the text of the run sheet, which has the answers."""
-    for i, cell in enumerate(notebook.cells):
-        if cell.source.startswith(SHEET):
-            sheet = "\n\n".join(other.source for other in notebook.cells[i:])
-            return notebook.cells[:i], sheet.removeprefix(SHEET).strip()
-    return notebook.cells, ""
 
 
 def kernel_address(folder: str) -> dict[str, str]:

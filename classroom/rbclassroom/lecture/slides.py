@@ -1,6 +1,7 @@
 """A stored lesson as slides: ``notebooks/slides/06.md`` has the texts that the class sees.
 
 A cell without such a text makes no slide; its own text goes to the notes of the previous slide.
+The same file has the run sheet of the lecturer.
 docs/authoring.md has the rules for authors.
 """
 
@@ -16,11 +17,13 @@ import nbformat
 from nbformat import NotebookNode
 from PIL import Image
 
-from rbclassroom.course.notebooks import shown_figures, split_sheet
+from rbclassroom.course.notebooks import shown_figures
 from rbclassroom.explorers import recorded
 
 BEHIND = ("Exercises", "Misprints", "References")
 """Sections whose slides come after the last slide; the key E leads to them."""
+SHEET = "run sheet"
+"""The name of the run sheet in a file of slides."""
 ROWS = 4
 """The largest number of table rows, or of works, on one slide."""
 SHORT = 300
@@ -70,6 +73,7 @@ class _Reader:
         self.root = path.resolve().parents[1]
         self.sketches = path.parent / "slides" / f"{path.name[:2]}.svg"
         self.texts = texts_of(self.sketches.with_suffix(".md"), names)
+        self.sheet = self.texts.pop(SHEET, "")
         self.section = ""
         self.shown, self.behind = list[Slide](), list[Slide]()
         self.ahead = list[str]()  # notes for the next slide
@@ -244,14 +248,14 @@ def plan(slides: list[Slide], names: dict[str, int], sheet: str) -> str:
 def texts_of(path: Path, names: Collection[str]) -> dict[str, str]:
     """Return the texts in a file by the cells that they belong to; `names` are those of the lesson.
 
-    A line such as ``## cell-04`` begins the text of a cell.
+    A line such as ``## cell-04`` begins the text of a cell, and ``## run sheet`` the run sheet.
     """
     texts, name = dict[str, str](), ""
     for number, line in enumerate(path.read_text(encoding="utf-8-sig").split("\n"), 1):
         where = f"slides/{path.name}, line {number}"
         if line.startswith("## "):
             name = line[3:].strip()
-            if name not in names:
+            if name != SHEET and name not in names:
                 raise ValueError(f"{where}: the lesson has no cell {name!r}")
             if name in texts:
                 raise ValueError(f"{where}: cell {name} has a text above")
@@ -266,7 +270,7 @@ def texts_of(path: Path, names: Collection[str]) -> dict[str, str]:
 def deck_of(path: Path) -> Deck:
     """Return the slides of a lesson in the folder ``notebooks`` of a course."""
     try:
-        cells, sheet = split_sheet(nbformat.read(path, as_version=4))
+        cells = nbformat.read(path, as_version=4).cells
         if not cells or not cells[0].source.startswith("# "):
             raise ValueError("it does not begin with a title, such as # The plane")
         reader = _Reader(path, {cell.id for cell in cells})
@@ -278,8 +282,8 @@ def deck_of(path: Path) -> Deck:
             reader.put(Slide("Questions?", "plain", title.parts))
         end = reader.shown[-1]
         end.kind, end.picture, end.notes = "end", title.picture, [*end.notes, note]
-        planned = plan(reader.shown, reader.names, sheet)
-        title.notes[:0] = sheet.splitlines()[:1]  # what to do before class
+        planned = plan(reader.shown, reader.names, reader.sheet)
+        title.notes[:0] = reader.sheet.splitlines()[:1]  # what to do before class
         return Deck(int(path.name[:2]), reader.shown, reader.behind, planned)
     except (ValueError, OSError) as error:
         raise ValueError(f"{path.name}: {error}") from error

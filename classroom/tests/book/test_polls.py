@@ -8,7 +8,7 @@ import pytest
 from nbformat.v4 import new_markdown_cell
 
 from rbclassroom.book import polls
-from rbclassroom.course.notebooks import lesson_paths, split_sheet
+from rbclassroom.course.notebooks import lesson_paths
 from rbclassroom.lecture.slides import deck_of
 
 PATHS = lesson_paths(Path(__file__).parents[3] / "notebooks")
@@ -23,7 +23,7 @@ OPTION = re.compile(
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 def test_each_poll_option_has_its_own_explanation(path):
     verdicts = {slide.poll: slide for slide in deck_of(path).shown if slide.kind == "verdict"}
-    cells, _ = split_sheet(nbformat.read(path, as_version=4))
+    cells = nbformat.read(path, as_version=4).cells
     polls.voted(cells)
     asked = [cell.source for cell in cells if cell.source.startswith("### Poll")]
     assert len(asked) == len(verdicts)

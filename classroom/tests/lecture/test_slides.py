@@ -19,7 +19,7 @@ from rbclassroom.lecture.slides import deck_of, sketch_of, texts_of
 
 ROOT = Path(__file__).parents[3]
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
-SHEET = "## Run sheet for the lecturer\n\n*Before class:* Sleep.\n\n"
+SHEET = "## run sheet\n\n*Before class:* Sleep.\n\n"
 SHEET += "| minute | part | ask | skip |\n|---|---|---|---|\n"
 
 
@@ -42,13 +42,12 @@ def picture(slide, size, **more):
 def tiny(folder, *cells, sheet=""):
     """Return the deck of a lesson that has a title and these cells."""
     pairs = [text("# Tiny: a lesson\n\nGoals.", "Why?"), *cells]
-    if sheet:
-        pairs.append(text(SHEET + sheet))
     (folder / "notebooks" / "slides").mkdir(parents=True, exist_ok=True)
     path = folder / "notebooks" / "01_tiny.ipynb"
     notebook = new_notebook(cells=[cell for cell, _ in pairs])
     path.write_text(nbformat.writes(notebook), encoding="utf-8")
     texts = "\n".join(f"## {cell.id}\n\n{slide}\n" for cell, slide in pairs if slide)
+    texts += SHEET + sheet if sheet else ""
     (path.parent / "slides" / "01.md").write_text(texts, encoding="utf-8")
     return deck_of(path)
 
