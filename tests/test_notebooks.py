@@ -1,6 +1,7 @@
 import base64
 import io
 import re
+from collections import Counter
 from pathlib import Path
 
 import nbformat
@@ -163,3 +164,20 @@ def test_every_stored_figure_is_drawn():
     assert {file.stem for file in STORED.iterdir() if file.is_file()} == names
     note = re.findall(r"^- \[(\w+)\]", (ROOT / "docs/near_optimal.md").read_text("utf-8"), re.M)
     assert set(note).union(*(cited_and_listed(path)[0] for path in LESSONS)) == set(WORKS)
+
+
+def right_letters(notebook):
+    """Return the right letters of the polls of a lesson."""
+    texts = [cell.source for cell in notebook.cells if cell.cell_type == "markdown"]
+    letters = [found[1] for text in texts if (found := re.match(r"\*\*([A-E])\*\*[.:] ", text))]
+    assert len(letters) == sum(text.startswith("### Poll ") for text in texts)
+    return letters
+
+
+def test_the_right_letters_of_polls_have_no_pattern():
+    letters = {path.stem: right_letters(notebook) for path, notebook in LESSONS.items()}
+    counts = Counter(sum(letters.values(), []))
+    shares = {letter: counts[letter] / counts.total() for letter in "ABCD"}
+    assert all(0.2 <= share <= 0.3 for share in shares.values()), shares
+    same = [stem for stem, right in letters.items() if len(right) >= 3 and len(set(right)) == 1]
+    assert same == []
