@@ -4,6 +4,7 @@ import re
 from functools import cache
 
 import numpy as np
+from mpl_toolkits.mplot3d import proj3d
 from scipy.linalg import hadamard
 
 from rbclassroom import explorers
@@ -68,6 +69,28 @@ def reads(text, wanted):
     found = re.findall(r"-?\d+(?:\.\d+)?", text)
     digits = np.array([len(each.partition(".")[2]) for each in found])
     return np.all(np.abs(np.array(found, float) - np.ravel(wanted)) <= 0.51 * 10.0**-digits)
+
+
+def off(found, wanted):
+    return np.abs(np.subtract(found, wanted)).max()
+
+
+def assert_box(box, R, half, place=(0, 0, 0), turned=1e-11, placed=1e-11):
+    """Check the orientation and the place of a box with these half edges."""
+    faces = box.corners[:6]
+    assert off(faces.mean(axis=(0, 1)), place) < placed
+    assert off(faces.mean(axis=1)[:3] - place, (half * R).T) < turned
+
+
+def assert_within(places, *limits):
+    for (low, high), along in zip(limits, np.transpose(places), strict=True):
+        assert low < along.min() <= along.max() < high
+
+
+def assert_seen(ax, places, *limits):
+    """Check that points in space, shape (..., 3), appear within these limits, in pixels."""
+    x, y, _ = proj3d.proj_transform(*np.reshape(places, (-1, 3)).T, ax.get_proj())
+    assert_within(ax.transData.transform(np.stack([x, y], axis=-1)), *limits)
 
 
 def notice(explorer):

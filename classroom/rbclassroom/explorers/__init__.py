@@ -5,15 +5,17 @@
 | 01 | `planar` | | 08 | `flip` |
 | 02 | `arm` | | 09, 11, 12 | `minimum_acceleration` |
 | 00, 03 | `rotation` | | 10 | `cube` |
-| 04 | `projection` | | 13 | `body` |
-| 05 | `random` | | 14 | `spline` |
-| 06 | `theta` | | 15 | `timing` |
-| 07 | `screw` | | 16 | `smoothing` |
-| | | | 17 | `chain` |
+| 03 | `interpolation` | | 13 | `body` |
+| 03 | `double_cover` | | 14 | `spline` |
+| 04 | `projection` | | 15 | `timing` |
+| 05 | `random` | | 16 | `smoothing` |
+| 06 | `theta` | | 17 | `chain` |
+| 07 | `screw` | | | |
 """
 
 from rbclassroom.explorers.bodies import body_explorer
 from rbclassroom.explorers.curves import flip_explorer, screw_explorer, theta_explorer
+from rbclassroom.explorers.interpolation import double_cover_explorer, interpolation_explorer
 from rbclassroom.explorers.optima import cube_explorer, minimum_acceleration_explorer
 from rbclassroom.explorers.paths import chain_explorer, spline_explorer
 from rbclassroom.explorers.plane import arm_explorer, planar_explorer
@@ -26,7 +28,9 @@ __all__ = [
     "body_explorer",
     "chain_explorer",
     "cube_explorer",
+    "double_cover_explorer",
     "flip_explorer",
+    "interpolation_explorer",
     "minimum_acceleration_explorer",
     "planar_explorer",
     "projection_explorer",

@@ -5,9 +5,20 @@ from functools import cache, partial
 
 import numpy as np
 import pytest
-from mpl_toolkits.mplot3d import proj3d
 from scipy.linalg import expm
-from sweeps import made, notice, points, read_off, reads, sweep, tell
+from sweeps import (
+    assert_box,
+    assert_seen,
+    assert_within,
+    made,
+    notice,
+    off,
+    points,
+    read_off,
+    reads,
+    sweep,
+    tell,
+)
 
 import rbcourse as rb
 from rbclassroom.explorers.paths import ANGLES, POSES, SHARES
@@ -22,28 +33,6 @@ MOMENTS = 0.5 / 12 * (BOOK @ BOOK - BOOK**2)
 START = np.radians([-20, 110])
 DIAGONAL = {"about": "the diagonal x + y + z"}
 COSTS_NOTHING = "none: the optimum costs nothing"
-
-
-def off(found, wanted):
-    return np.abs(np.subtract(found, wanted)).max()
-
-
-def assert_box(box, R, half, place=(0, 0, 0), turned=1e-11, placed=1e-11):
-    """Check the orientation and the place of a box with these half edges."""
-    faces = box.corners[:6]
-    assert off(faces.mean(axis=(0, 1)), place) < placed
-    assert off(faces.mean(axis=1)[:3] - place, (half * R).T) < turned
-
-
-def assert_within(places, *limits):
-    for (low, high), along in zip(limits, np.transpose(places), strict=True):
-        assert low < along.min() <= along.max() < high
-
-
-def assert_seen(ax, places, *limits):
-    """Check that points in space, shape (..., 3), appear within these limits, in pixels."""
-    x, y, _ = proj3d.proj_transform(*np.reshape(places, (-1, 3)).T, ax.get_proj())
-    assert_within(ax.transData.transform(np.stack([x, y], axis=-1)), *limits)
 
 
 @pytest.mark.parametrize(
