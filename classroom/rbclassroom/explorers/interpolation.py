@@ -10,7 +10,7 @@ from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, new_figure, new_line, new_space, numbers
 from rbcourse.draw.bodies import draw_box, move_box
 from rbcourse.draw.save import COLOURS, PALE
-from rbcourse.draw.space import Faces
+from rbcourse.draw.space import LIGHT, Faces
 from rbcourse.quaternion import quaternion_from_rotation_vector as quaternion_of
 from rbcourse.quaternion import quaternion_from_zyx, quaternion_multiply
 
@@ -129,7 +129,7 @@ def double_cover_explorer() -> Explorer:
         side.plot(np.cos(turns), np.sin(turns), color=PALE, lw=1)
         violet: Any = {"color": COLOURS["screw"]}
         dot: Any = {"marker": "o", "ls": "", **violet}
-        colours = np.repeat(["#F0A46E", "#9CC8E8"], len(_HEIGHTS) - 1)
+        colours = [*np.repeat(["#F0A46E", "#9CC8E8"], len(_HEIGHTS) - 1), "none"]
         belt = Faces(_belt(_quaternions(0, 0)), colours)
         belt.set_edgecolor("none")
         artists: dict[str, Any] = {
@@ -183,9 +183,12 @@ def _belt(q: rb.Array) -> rb.Array:
     """Return the corners of the faces of the belt, shape (n, 4, 3).
 
     The straight belt is above the plate's centre, and each cross-section turns about this centre.
-    Their distances from it differ, so the middle line of the belt never meets itself.
+    Their distances from it differ, so the middle line of the belt never meets itself. The last face
+    is a single point, far from the light, so that `Faces` takes the lit side of each face as its
+    outer side.
     """
     straight = np.stack(np.broadcast_arrays(_WIDE, 0, _HEIGHTS[:, None]), axis=-1)
     sections = straight @ np.swapaxes(rb.matrix_from_quaternion(q), -1, -2)
     halves = sections[:, :2], sections[:, 1:]
-    return np.concatenate([np.hstack([half[:-1], half[1:, ::-1]]) for half in halves])
+    faces = [np.hstack([half[:-1], half[1:, ::-1]]) for half in halves]
+    return np.concatenate([*faces, np.tile(-1e6 * LIGHT, (1, 4, 1))])

@@ -95,7 +95,7 @@ def belt(turn, untwist):
 
 def drawn(artists):
     """Return the drawn cross-sections of the belt, shape (n, 3, 3)."""
-    left, right = np.split(artists["belt"].corners, 2)
+    left, right = np.split(artists["belt"].corners[:-1], 2)
     assert np.array_equal(left[:, 1:3], right[:, [0, 3]])
     above = np.concatenate([left[:, :2], right[:, 1:2]], axis=1)
     below = np.concatenate([left[:, :1:-1], right[:, 2:3]], axis=1)
