@@ -20,12 +20,12 @@ from PIL import Image
 from rbclassroom.course.notebooks import shown_figures
 from rbclassroom.explorers import recorded
 
-BEHIND = ("Exercises", "Misprints", "References")
+BEHIND = ("Exercises", "References")
 """Sections whose slides come after the last slide; the key E leads to them."""
 SHEET = "run sheet"
 """The name of the run sheet in a file of slides."""
-ROWS = 4
-"""The largest number of table rows, or of works, on one slide."""
+WORKS = 4
+"""The largest number of works on one slide."""
 SHORT = 300
 """An exercise stands below other ones if these have fewer characters than this."""
 _ITEM = re.compile(r"^(- )?\*\*([A-Z])\*\* (?:· )?(.*)$\n?", re.M)
@@ -156,7 +156,7 @@ class _Reader:
                 self.put_text(wish, "title" if level == "#" else "plain")
 
     def put_behind(self, words: str, text: str, wish: str) -> None:
-        """Add slides after the end; a long table or list is split over several slides."""
+        """Add slides after the end; a long list of works is split over several slides."""
         if words.startswith("Exercise "):
             text = wish or re.sub(r"<details>.*?</details>", "", text, flags=re.S)
             text = f"**{words}.** {text.strip()}"
@@ -164,11 +164,10 @@ class _Reader:
                 self.behind[-1].parts[0] += f"\n\n{text}"
             else:
                 self.put(Slide(self.section, "plain", [text]))
-        elif words in ("Misprints", "References"):
-            _, *rows = re.split(r"^(?=[-|] )", text, flags=re.M)
-            head = rows.pop(0) if rows[0].startswith("|") else ""
-            for i in range(0, len(rows), ROWS):
-                self.put(Slide(words, "plain", [head + "".join(rows[i : i + ROWS])]))
+        elif words == "References":
+            _, *works = re.split(r"^(?=- )", text, flags=re.M)
+            for i in range(0, len(works), WORKS):
+                self.put(Slide(words, "plain", ["".join(works[i : i + WORKS])]))
 
 
 def sketch_of(path: Path, name: str) -> tuple[str, float]:
@@ -277,7 +276,7 @@ def deck_of(path: Path) -> Deck:
         for cell in cells:
             reader.read(cell)
         title = reader.shown[0]
-        note = "E leads to exercises, misprints and references, after this slide."
+        note = "E leads to exercises and references, after this slide."
         if reader.shown[-1].title != "Recap":
             reader.put(Slide("Questions?", "plain", title.parts))
         end = reader.shown[-1]
