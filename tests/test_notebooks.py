@@ -176,7 +176,7 @@ def right_letters(notebook):
 
 def test_the_right_letters_of_polls_have_no_pattern():
     letters = {path.stem: right_letters(notebook) for path, notebook in LESSONS.items()}
-    counts = Counter(sum(letters.values(), []))
+    counts = Counter(letter for right in letters.values() for letter in right)
     shares = {letter: counts[letter] / counts.total() for letter in "ABCD"}
     assert all(0.2 <= share <= 0.3 for share in shares.values()), shares
     same = [stem for stem, right in letters.items() if len(right) >= 3 and len(set(right)) == 1]
