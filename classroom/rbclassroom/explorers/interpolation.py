@@ -154,9 +154,11 @@ def double_cover_explorer() -> Explorer:
         artists["front"].set_data_3d(*np.outer(R[:, 0], _PLATE[0] * np.array([0.5, 0.9])))
         artists["path"].set_data(q[:, 0], q[:, 3])
         artists["q"].set_data(q[-1:, 0], q[-1:, 3])
-        belt = f"twisted by {turn:.0f}°" if turn else "straight"
-        if turn == 720 and untwist > 0:
-            belt = "partly untwisted" if untwist < 1 else "straight"
+        belt = f"{'still ' if untwist else ''}twisted by {turn:.0f}°"
+        if turn == 720 and 0 < untwist < 1:
+            belt = "partly untwisted"
+        elif turn == 0 or (turn, untwist) == (720, 1):
+            belt = "straight"
         return {
             "plate": "as at the start" if turn % 360 == 0 else f"turned by {turn:.0f}°",
             "quaternion": numbers(q[-1], 2),
