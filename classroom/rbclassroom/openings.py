@@ -70,7 +70,7 @@ def _compare(
     draw: Callable[..., Update],
     lesson: int,
     alt: str,
-    motions: Sequence[Any],
+    motions: Any,
     notes: Sequence[Sequence[str]],
     titles: Sequence[str] = BOTH,
     still: int = -1,
@@ -119,14 +119,14 @@ def _turning(
     ax: Any,
     M: Array,
     reach: float = 1.1,
-    edges: Sequence[float] = (1.2, 0.8, 0.35),
+    edges: ArrayLike = (1.2, 0.8, 0.35),
     target: Array | None = None,
 ) -> Update:
     """Draw a box that 3 × 3 matrices map, a pointer along its axis x, and the trail of its tip.
 
     A black dot is at the `target` of the pointer.
     """
-    sides, poses = np.array(edges), _placed(M)
+    sides, poses = np.asarray(edges), _placed(M)
     box, trail = bodies.draw_box(ax, poses[0], sides), _trail(ax, 1.1 * M[:, :, 0])
     (pointer,) = ax.plot([], [], [], color=_RED, lw=3)
     (dot,) = ax.plot([], [], [], "o", color="black", ms=9)
@@ -147,8 +147,8 @@ def _flying(ax: Any, poses: Array, edges: Array, view: Sequence[float], zoom: fl
     """Draw a box that moves in space, its goal, and the trail of its centre."""
     goal, box = (bodies.draw_box(ax, poses[-1], edges) for _ in range(2))
     goal.set(colours=["none"] * 7, edgecolor=PALE)
-    trail, ends = _trail(ax, poses[:, :3, 3]), poses[[0, -1], :3, 3]
-    low, high = np.min(poses[:, :3, 3], axis=0) - edges.max() / 2, ends.max(axis=0) + edges.max()
+    places, margin = poses[:, :3, 3], edges.max() / 2
+    trail, low, high = _trail(ax, places), places.min(axis=0) - margin, places.max(axis=0) + margin
     bodies.draw_ground(ax, low, high)
     ax.fit(low, high, zoom)
     ax.view_init(*view)
@@ -252,7 +252,11 @@ def camera_that_loses_its_target() -> Animation:
     motions = [rb.matrix_from_zyx(angles)[::10], wanted[::10]]
     off = np.degrees(rb.angle_between(*motions))
     alt = f"A camera loses its target, which passes overhead: it is up to {off.max():.0f}° off."
-    look = {"still": int(off.argmax()), "seconds": 4.0, "target": motions[1][:, :, 0]}
+    look: dict[str, Any] = {
+        "still": int(off.argmax()),
+        "seconds": 4.0,
+        "target": motions[1][:, :, 0],
+    }
     return _compare(_turning, 3, alt, motions, _said("off by {:.0f}°", off, 0 * off), **look)
 
 
@@ -322,18 +326,21 @@ def wrench_that_leaves_its_bolt() -> Animation:
 
 def _wrench(ax: Any, nuts: Array) -> Update:
     """Draw a bolt, a nut with a handle that moves, and the trail of the hand."""
-    end, handle = rb.pose_from_coordinates([[0, 0, 0, 0, 0, 0.06], [0, 0, 0, 0.175, 0, 0]])
-    bodies.draw_box(ax, end, np.array([0.04, 0.04, 0.06])).set(colours=["0.5"] * 7)
-    parts = [(np.eye(4), np.array([0.1, 0.1, 0.05])), (handle, np.array([0.25, 0.04, 0.03]))]
-    boxes = [bodies.draw_box(ax, nuts[0], edges) for _, edges in parts]
-    trail = _trail(ax, (nuts @ [0.3, 0, 0, 1])[:, :3])
+    bolt = bodies.draw_box(
+        ax, rb.pose_from_components(_I, [0, 0, 0.06]), np.array([0.04, 0.04, 0.06])
+    )
+    bolt.set(colours=["0.5"] * 7)
+    nut, edges = bodies.draw_box(ax, nuts[0], 0.1), np.array([0.1, 0.1, 0.05])
+    (handle,) = ax.plot([], [], [], color=COLOURS["z"], lw=7)
+    ends = nuts @ np.array([[0.05, 0, 0, 1], [0.3, 0, 0, 1]]).T
+    trail = _trail(ax, ends[:, :3, 1])
     ax.fit([-0.3, -0.27, -0.05], [0.32, 0.33, 0.1], zoom=1.5)
     ax.view_init(elev=50, azim=-90)
 
     def update(i: int) -> list[Any]:
-        for box, (place, edges) in zip(boxes, parts, strict=True):
-            bodies.move_box(box, nuts[i] @ place, edges)
-        return [*boxes, *trail(i)]
+        bodies.move_box(nut, nuts[i], edges)
+        handle.set_data_3d(*ends[i, :3])
+        return [nut, handle, *trail(i)]
 
     return update
 
@@ -380,7 +387,7 @@ def _costly(lesson: int, alt: str, curves: Mapping[str, Curve], good: str, still
 
 
 def turn_that_snaps() -> Animation:
-    """Lesson 9: a gripper snaps round; the number is the cost, divided by the least cost."""
+    """Lesson 9: a gripper snaps round; the number is its cost over the least cost."""
     ends = _I, rb.exp_so3([0, 0, np.radians(170)]), _REST, _REST
     curves = {"projected cubic": rb.projected_cubic(*ends)}
     curves["least acceleration"] = rb.minimum_acceleration(*ends)
@@ -390,19 +397,24 @@ def turn_that_snaps() -> Animation:
 
 def cube_that_comes_from_another_side() -> Animation:
     """Lesson 10: a cube comes from another side; the number is its largest distance in m."""
-    A0, A1 = rb.pose_from_coordinates([[0] * 6, [np.pi / 6, 2 * np.pi / 3, np.pi / 2, 8, 10, 12]])
+    A0, A1 = rb.pose_from_coordinates([6 * [0.0], [np.pi / 6, 2 * np.pi / 3, np.pi / 2, 8, 10, 12]])
     w0, w1, d0_dot, d1_dot = np.array([[1.0, 2, 3], [2, 1, 1], [1, 1, 1], [20, 0, 20]])
     S0, S1 = rb.twist_from_rates([A0, A1], [w0, w1], [d0_dot, d1_dot])
     wrong = np.concatenate([w1, d1_dot])
     motions = [rb.minimum_acceleration(A0, A1, S0, S)(T) for S in (wrong, S1)]
     off = np.linalg.norm((motions[0] - motions[1])[:, :3, 3], axis=1)
     alt = f"A cube comes from another side than was meant, and is up to {off.max():.1f} m off."
-    look = {"edges": 3 * np.ones(3), "view": (20, -22), "zoom": 1.15, "still": int(off.argmax())}
+    look: dict[str, Any] = {
+        "edges": 3 * np.ones(3),
+        "view": (20, -22),
+        "zoom": 1.3,
+        "still": int(off.argmax()),
+    }
     return _compare(_flying, 10, alt, motions, _said("off by {:.1f} m", off, 0 * off), **look)
 
 
 def turn_that_goes_back() -> Animation:
-    """Lesson 11: a gripper turns back; the number is the cost, divided by that of a Bézier curve."""
+    """Lesson 11: a gripper turns back; the number is its cost over that of a Bézier curve."""
     ends = _I, rb.exp_so3([0, 0, np.radians(170)]), [0, 0, -3], [0, 0, -3]
     curves = {"exponential cubic": rb.closed_forms.exponential_cubic(*ends)}
     curves["Bézier"] = rb.closed_forms.bezier(*ends)
@@ -443,7 +455,9 @@ def book_taken_for_a_ball() -> Animation:
 
 def _bars(fig: Figure, lengths: Array) -> Update:
     """Draw bars below two panels; the unit of their lengths is the width of the figure."""
-    bars = [fig.add_artist(Line2D([], [], lw=9, color=_RED)) for _ in range(2)]
+    bars = [Line2D([], [], lw=9, color=_RED) for _ in range(2)]
+    for bar in bars:
+        fig.add_artist(bar)
 
     def update(i: int) -> list[Any]:
         for left, bar, length in zip((0.1, 0.6), bars, lengths[:, i], strict=True):
@@ -474,9 +488,14 @@ def camera_that_jolts() -> Animation:
 
 def tool_at_one_rate() -> Animation:
     """Lesson 15: a tool is slow everywhere; the number is its time over that of the fastest."""
-    turned, stops = [0, 0, 2], [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0]]
-    poses = rb.pose_from_components(rb.exp_so3([_REST, _REST, turned, turned, turned]), stops)
-    limits = {"angular_speed": 2, "speed": 3, "angular_acceleration": 4.8, "acceleration": 8}
+    stops = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0]]
+    poses = rb.pose_from_components(rb.exp_so3(np.outer([0, 0, 2, 2, 2], _I[2])), stops)
+    limits: dict[str, Any] = {
+        "angular_speed": 2,
+        "speed": 3,
+        "angular_acceleration": 4.8,
+        "acceleration": 8,
+    }
     path = rb.projected_spline(np.arange(5.0), poses)
     used, fastest = rb.limits_used(path, **limits), rb.fastest(path, **limits)
     even = 4 * max(x if name.endswith("speed") else x**0.5 for name, (x, _) in used.items())
@@ -484,7 +503,12 @@ def tool_at_one_rate() -> Animation:
     ratio = f"{even / fastest.domain[1]:.1f} times as long"
     alt = f"A tool that moves at one rate takes {ratio} as with the fastest timing."
     notes, titles = _said("{:.1f} s", slow, fast), (f"one rate: {ratio}", "the fastest timing")
-    look = {"edges": np.array([0.5, 0.3, 0.15]), "view": (25, -60), "zoom": 1.35, "seconds": even}
+    look: dict[str, Any] = {
+        "edges": np.array([0.5, 0.3, 0.15]),
+        "view": (30, -70),
+        "zoom": 1.35,
+        "seconds": even,
+    }
     motions, still = [path(4 * T), fastest(fast)], int((slow > fast).argmax())
     return _compare(_flying, 15, alt, motions, notes, titles, still, **look)
 
