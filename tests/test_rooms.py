@@ -31,6 +31,7 @@ MAY_IMPORT = {  # each part of the packages may import only the listed parts
     | {"rbclassroom.course", "rbclassroom.figures"},
     "rbclassroom.atlas": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
     "rbclassroom.rivals": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
+    "rbclassroom.openings": {"rbcourse", "rbcourse.draw", "rbclassroom.figures"},
     "rbclassroom.polls": set(),
     "rbclassroom.course": {"rbcourse", "rbclassroom"},
     "rbclassroom.assignments": {"rbcourse", "rbcourse.draw", "rbclassroom", "rbclassroom.course"},
@@ -54,6 +55,7 @@ LIBRARIES = {
     "rbclassroom.figures": {"matplotlib"},
     "rbclassroom.atlas": {"threadpoolctl"},
     "rbclassroom.rivals": set(),
+    "rbclassroom.openings": {"matplotlib"},
     "rbclassroom.polls": {"anywidget", "traitlets"},
     "rbclassroom.course": {"PIL", "jupyterlab", "nbclient", "nbformat", "tornado"},
     "rbclassroom.lecture": {"PIL", "markdown_it", "mdit_py_plugins", "nbformat"}

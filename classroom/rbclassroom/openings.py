@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
-from numpy.typing import ArrayLike
 
 import rbcourse as rb
 from rbclassroom.figures import lesson13, lesson16
@@ -86,7 +85,7 @@ def _compare(
         return _animation(fig, lesson, alt, moves, notes, still, seconds)
 
 
-def _said(form: str, *values: ArrayLike) -> list[list[str]]:
+def _said(form: str, *values: Any) -> list[list[str]]:
     """Return several series of values as texts."""
     series = ((np.round(x, 6) + 0.0).tolist() for x in values)
     return [[form.format(value).replace("-", "−") for value in x] for x in series]
@@ -119,7 +118,7 @@ def _turning(
     ax: Any,
     M: Array,
     reach: float = 1.1,
-    edges: ArrayLike = (1.2, 0.8, 0.35),
+    edges: Any = (1.2, 0.8, 0.35),
     target: Array | None = None,
 ) -> Update:
     """Draw a box that 3 × 3 matrices map, a pointer along its axis x, and the trail of its tip.
@@ -211,7 +210,7 @@ def _car(ax: Any, path: Array) -> Update:
 def hand_that_hits_a_glass() -> Animation:
     """Lesson 2: the hand of an arm hits a glass; the number is the length of its path in m."""
     ends = np.radians([[-20, 20], [160, 120]])
-    wrong = rb.arm.interpolate_joints(*ends, FRAMES - 1)
+    wrong = rb.arm.interpolate_joints(ends[0], ends[1], FRAMES - 1)
     tips = rb.arm.arm_forward_kinematics(wrong).joints[:, -1]
     line = tips[0] + T[:, None] * (tips[-1] - tips[0])
     right = np.unwrap(rb.arm.arm_inverse_kinematics(line)[:, 0], axis=0)
@@ -230,7 +229,7 @@ def _arm(ax: Any, path: Array, place: Array) -> Update:
         rb.arm.arm_forward_kinematics(path).joints[:, -1],
     )
     hit = np.linalg.norm(tips - place, axis=1) < 0.3
-    glass = ax.add_patch(Circle(place, 0.3, ec="black", zorder=5))
+    glass = ax.add_patch(Circle((place[0], place[1]), 0.3, ec="black", zorder=5))
     ax.text(place[0], place[1] - 0.9, "glass", ha="center")
     ax.set(ylim=(-2.3, 3.8))
     ax.set_axis_off()

@@ -9,7 +9,7 @@ import rbcourse as rb
 from rbclassroom import openings
 from rbclassroom.figures import lesson16
 
-I, REST = np.eye(3), np.zeros(3)
+EYE, REST = np.eye(3), np.zeros(3)
 
 
 def cost_ratio(one, other, *ends):
@@ -30,7 +30,7 @@ def longest_joint_path():
 def largest_lag():
     """The yaw and the roll change by a half-turn at 2 s; yaw, pitch and roll do 60°/s."""
     t = np.linspace(0, 4, 501)
-    goal = rb.exp_so3(np.outer(-np.pi * t / 4, I[1])) @ turn(-1)
+    goal = rb.exp_so3(np.outer(-np.pi * t / 4, EYE[1])) @ turn(-1)
     angles = [rb.zyx_from_matrix(goal[0])]
     for wanted in np.unwrap(rb.zyx_from_matrix(goal), axis=0)[1:]:
         angles.append(angles[-1] + np.clip(wanted - angles[-1], *np.radians([-0.48, 0.48])))
@@ -44,7 +44,7 @@ def distance_of_the_cubes():
 
 
 def factor_of_torque():
-    body, ends = rb.Body.box([0.30, 0.20, 0.03]), (I, turn(150, [1, 1, 1]), REST, REST)
+    body, ends = rb.Body.box([0.30, 0.20, 0.03]), (EYE, turn(150, [1, 1, 1]), REST, REST)
     best = rb.minimum_torque(*ends, body=body)
     return rb.torque_cost(rb.minimum_acceleration(*ends), body=body) / best.cost
 
@@ -57,7 +57,7 @@ def jumps():
 
 def time_of_the_first_turn():
     J, t = np.array([0.13**2 + 0.03**2, 0.2**2 + 0.03**2, 0.2**2 + 0.13**2]), np.arange(0, 3, 0.01)
-    R, w = rb.connection.geodesic_flow(np.diag(J), I, [0.2, 4, 0.2], t)
+    R, w = rb.connection.geodesic_flow(np.diag(J), EYE, [0.2, 4, 0.2], t)
     momentum = R[0] @ (J * w[0])
     return t[(R[:, :, 1] @ momentum < 0).argmax()]
 
@@ -67,9 +67,11 @@ def most_needed():
     return np.linalg.norm(hand(np.linspace(0, 4, 801), 2), axis=1).max()
 
 
+PROJECTED, BEST = rb.projected_cubic, rb.minimum_acceleration
 CUBIC, BEZIER = rb.closed_forms.exponential_cubic, rb.closed_forms.bezier
-LESSON_11 = I, turn(170), [0, 0, -3], [0, 0, -3]
-LESSON_12 = I, turn(135, [1, 1, 0]), [0, 0, 4], [-4, 0, 0]
+LESSON_9 = EYE, turn(170), REST, REST
+LESSON_11 = EYE, turn(170), [0, 0, -3], [0, 0, -3]
+LESSON_12 = EYE, turn(135, [1, 1, 0]), [0, 0, 4], [-4, 0, 0]
 
 
 def found(*ends):
@@ -88,18 +90,10 @@ def found(*ends):
         ("box_that_shrinks", lambda: f"{100 * np.cos(np.radians(75)):.0f} %"),
         ("wrench_that_leaves_its_bolt", lambda: f"{30 * (1 - np.cos(np.radians(75))):.0f} cm"),
         ("book_that_turns_over", lambda: f"{time_of_the_first_turn():.1f} s"),
-        (
-            "turn_that_snaps",
-            lambda: (
-                f"{cost_ratio(rb.projected_cubic, rb.minimum_acceleration, I, turn(170), REST, REST):.0f} times"
-            ),
-        ),
+        ("turn_that_snaps", lambda: f"{cost_ratio(PROJECTED, BEST, *LESSON_9):.0f} times"),
         ("cube_that_comes_from_another_side", lambda: f"{distance_of_the_cubes():.1f} m"),
         ("turn_that_goes_back", lambda: f"{cost_ratio(CUBIC, BEZIER, *LESSON_11):.0f} times"),
-        (
-            "solver_at_a_local_minimum",
-            lambda: f"{cost_ratio(found, rb.minimum_acceleration, *LESSON_12):.0f} times",
-        ),
+        ("solver_at_a_local_minimum", lambda: f"{cost_ratio(found, BEST, *LESSON_12):.0f} times"),
         ("book_taken_for_a_ball", lambda: f"{100 * factor_of_torque() - 100:.0f} %"),
         ("camera_that_jolts", lambda: f"{jumps().max():.1f} rad/s"),
         ("tool_at_one_rate", lambda: "2.3 times"),

@@ -14,6 +14,7 @@ CLASSROOM = [
     "figures",
     "atlas",
     "rivals",
+    "openings",
     "polls",
     "course",
     "lecture",
