@@ -10,7 +10,7 @@ import nbformat
 ROOT = Path(__file__).parents[1]
 LESSONS = {path.name[:2]: path for path in (ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb")}
 GUIDE = (ROOT / "docs/reading_guide.md").read_text("utf-8")
-ROWS = [line.split(" | ") for line in GUIDE.splitlines() if line.startswith("| ")][1:]
+_, *ROWS = [line.split(" | ") for line in GUIDE.splitlines() if line.count(" | ") == 3]
 
 
 def texts_of(number):

@@ -355,7 +355,7 @@ def book_that_turns_over() -> Animation:
     i = int((R[:, 0, 2, 1] < 0).argmax())
     over = np.interp(0, R[[i, i - 1], 0, 2, 1], t[[i, i - 1]])
     alt = f"A book that spins about its middle axis turns over after {over:.1f} s, without torque."
-    titles, notes = ("about the middle axis", "about the shortest axis"), _said("{:.1f} s", t, t)
+    titles, notes = ("about one axis", "about another axis"), _said("{:.1f} s", t, t)
     notes[0][i:] = [f"{said}, turned over at {over:.1f} s" for said in notes[0][i:]]
     motions = R.swapaxes(0, 1)
     return _compare(_book, 8, alt, motions, notes, titles, i + 9, seconds=6.0, edges=edges)

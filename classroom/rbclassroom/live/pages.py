@@ -24,9 +24,9 @@ _IN_PAGES = {  # sentences about Jupyter, and the sentences that replace them
 
 
 def mark_lesson(notebook: NotebookNode, name: str) -> None:
-    """Mark the cells of a lesson that can be run; explorers need Jupyter."""
+    """Mark the cells of a lesson that can be run, without its opening; explorers need Jupyter."""
     for cell in notebook.cells:
-        apart = cell.id in LEFT_OUT.get(name, {}) or "_explorer(" in cell.source
+        apart = cell.id in {"opening", *LEFT_OUT.get(name, {})} or "_explorer(" in cell.source
         if cell.cell_type == "code" and not apart:
             cell.metadata.tags = [*cell.metadata.get("tags", []), f"try-{cell.id}"]
 

@@ -102,7 +102,8 @@ def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
     cells = [cell for cell in joined(notebook.cells) if cell.cell_type == "code"]
     differ = set()
     for at, cell in enumerate(cells):
-        if "_explorer(" in cell.source or VOTE.search(cell.source):  # they need Jupyter
+        here = cell.id != "opening" and "_explorer(" not in cell.source
+        if not here or VOTE.search(cell.source):  # they need Jupyter
             continue
         if listed.get(cell.id, "").startswith("takes"):
             differ.add(cell.id)
