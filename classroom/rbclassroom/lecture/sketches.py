@@ -154,19 +154,6 @@ def angles() -> Paths:
     }
 
 
-def beam() -> Paths:
-    """Return the deflection of a clamped beam: under a load at 0.36 of its length, and under 1."""
-    a, b = 0.36, 0.64
-    place = np.array([0, (a * b) ** 3 / 3, 0])
-    slope = np.array([0, (a * b) ** 2 * (b - a) / 2, 0])
-    t = np.linspace(0, 1, 7)
-    constant, rate = (t * (1 - t)) ** 2 / 24, t * (1 - t) * (1 - 2 * t) / 12
-    return {
-        "beam-place": graph((90, 190, 460, -22060), np.array([0, a, 1]), place, slope),
-        "beam-constant": graph((90, 500, 460, -46080), t, constant, rate),
-    }
-
-
 def triangle() -> Paths:
     """Return the natural cubic spline through three angles."""
     t = np.array([0, 1, 1 + np.sqrt(2)])
@@ -195,7 +182,6 @@ SKETCHES: dict[str, tuple[Callable[[], Paths], ...]] = {
     "08": (saddle,),
     "09": (start,),
     "11": (angles,),
-    "13": (beam,),
     "14": (triangle,),
     "15": (onerate,),
 }
