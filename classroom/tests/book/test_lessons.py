@@ -127,7 +127,9 @@ def test_code_is_folded_except_in_answers_to_exercises():
     assert hidden == [True, True, False, True]
 
 
-def test_a_lesson_begins_with_its_question_and_a_picture():
-    text = "# A\n\n**Question.** Why?\n\n| | |\n|---|---|\n| Time | 1 |"
-    lead = '<figure class="lead"><img></figure>'
-    assert lessons.with_lead(text, "<img>") == text.replace("| | |", f"{lead}\n\n| | |")
+def test_a_page_begins_with_the_opening_and_ends_with_the_imports():
+    opening = new_code_cell("opening()", outputs=[new_output("stream", text="2")])
+    cells = [*markdown("# A"), opening, new_code_cell("import numpy"), *markdown("## 1")]
+    told = "The code of this lesson begins with these imports."
+    ordered = [cell.source for cell in lessons.in_order(cells)]
+    assert ordered == ["# A", "opening()", "## 1", told, "import numpy"]
