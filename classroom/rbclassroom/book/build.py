@@ -120,17 +120,16 @@ class Sources:
             for work in lessons.cited_in(notebook):
                 works[work].append(path.stem)
             drawing = decks[path.stem].shown[0].picture
-            lessons.prepare(notebook, path.name, self.root, known, where)
+            sheet, sheet_page = decks[path.stem].sheet, f"teach/{path.stem}.md"
+            at = sheet_page if sheet else ""
+            lessons.prepare(notebook, path.name, self.root, known, where, at)
             lessons.add_buttons(notebook, path.name, self.repository)
             if self.live:
                 pages.mark_lesson(notebook, path.stem)
             self.put(page, nbformat.writes(notebook))
-            if sheet := decks[path.stem].sheet:
-                text = f"# Run sheet: {title}\n\n{sheet}\n"
-                self.put(
-                    f"teach/{path.stem}.md",
-                    relinked(text, f"notebooks/{path.name}", f"teach/{path.stem}.md"),
-                )
+            if sheet:
+                text = relinked(sheet, f"notebooks/{path.name}", sheet_page)
+                self.put(sheet_page, f"# Run sheet: {title}\n\n{text}\n")
             row = re.search(rf"^\| \[.*\]\(.*{path.name}\) \| (.*) \| (.*) \|$", readme, re.M)
             question, minutes = row.groups() if row else ("", "")
             shown.append(

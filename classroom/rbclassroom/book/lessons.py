@@ -212,13 +212,18 @@ def hide_code(cells: list[NotebookNode]) -> None:
 
 
 def prepare(
-    notebook: NotebookNode, name: str, root: Path, known: dict[bytes, str], folder: Path
+    notebook: NotebookNode,
+    name: str,
+    root: Path,
+    known: dict[bytes, str],
+    folder: Path,
+    sheet: str = "",
 ) -> None:
     """Prepare the notebook of a lesson for the book.
 
-    The pictures become files, see `with_picture_files`.
+    The pictures become files, see `with_picture_files`. `sheet` is the address of the run sheet.
     """
-    path, page, sheet = f"notebooks/{name}", f"lessons/{name}", f"../teach/{Path(name).stem}.md"
+    path, page = f"notebooks/{name}", f"lessons/{name}"
     lessons = {int(each.name[:2]): each.name for each in lesson_paths(root / "notebooks")}
     works = names((root / "notebooks" / "REFERENCES.bib").read_text("utf-8"))
     cells = notebook.cells
@@ -233,7 +238,8 @@ def prepare(
             lines = cell.source.split("\n")
             keyed = [with_keys(x, page) if x.startswith("<small>") else x for x in lines]
             text = relinked(_LESSON.sub(to_lesson, "\n".join(keyed)), path, page)
-            text = _TIME.sub(rf"\1 · [run sheet for lecturers]({sheet}) |", text)
+            if sheet:
+                text = _TIME.sub(rf"\1 · [run sheet for lecturers](../{sheet}) |", text)
             cell.source = with_citations(text, works, here, "../references.html")
             continue
         explorer = _EXPLORER.search(cell.source)
