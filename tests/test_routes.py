@@ -1,4 +1,4 @@
-"""Compare the routes of lesson 00 with the run sheets and the times of the lessons."""
+"""Compare the routes in `docs/routes.md` with the run sheets and the times of the lessons."""
 
 import re
 from itertools import pairwise
@@ -7,10 +7,10 @@ from pathlib import Path
 import nbformat
 import pytest
 
-NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = ROOT / "notebooks"
 LESSONS = {path.name[:2]: path for path in sorted(NOTEBOOKS.glob("[0-9][0-9]_*.ipynb"))}
-ROUTES = "\n".join(cell.source for cell in nbformat.read(LESSONS["00"], 4).cells)
-ROUTES = re.split(r"^### ", ROUTES[ROUTES.index("## Routes") :], flags=re.MULTILINE)[1:]
+ROUTES = re.split(r"^## ", (ROOT / "docs" / "routes.md").read_text("utf-8"), flags=re.MULTILINE)[1:]
 ORDER = "first", "second"
 
 
