@@ -1,6 +1,6 @@
 """Moving pictures of failures, one for the first screen of each lesson.
 
-Each function returns an animation with a number that states what the failure costs. Where two
+Each function returns an animation with a number that states the cost of the failure. Where two
 motions are compared, the left panel shows the failure.
 """
 
