@@ -67,9 +67,9 @@ def record(folder):
         write_figure(fig, name, *files)
         check_looks(fig)
 
-    def animated(fig, name, alt, update, count, *more):
+    def animated(fig, name, alt, update, count, *more, **options):
         frames[fig] = [pair for i in range(count) for pair in by_names(update(i))]
-        return animate_(fig, name, alt, update, count, *more)
+        return animate_(fig, name, alt, update, count, *more, **options)
 
     for module in (save, animate):
         module.write_figure = written
