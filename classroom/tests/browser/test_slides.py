@@ -122,7 +122,7 @@ def test_a_remote_control_goes_through_all_steps(deck):
     assert deck.evaluate(HERE).partition("\n")[0] == here.partition("\n")[0]
     deck.keyboard.press("PageDown")
     assert deck.locator(f"{SLIDE} .panel input").count() == 0
-    deck.keyboard.press("Shift+ArrowLeft")
+    opened(deck, of(LESSONS[6]))
     while not deck.evaluate("Reveal.getCurrentSlide().matches('.end')"):
         seen.append(deck.evaluate("Reveal.getCurrentSlide().className"))
         deck.keyboard.press("PageDown")
