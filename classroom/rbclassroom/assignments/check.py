@@ -4,6 +4,7 @@ Students run this module before they submit. It does not need nbgrader.
 """
 
 import io
+import json
 import logging
 import os
 import re
@@ -19,6 +20,7 @@ from nbformat import NotebookNode
 
 from rbclassroom.assignments import locked_cells
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test, name_cell
+from rbclassroom.assignments.my_motion import FILE, find, keep
 from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient
 from rbclassroom.assignments.safe_files import write_whole
 from rbclassroom.assignments.submissions import count_found, read_notebook, restore
@@ -29,8 +31,9 @@ from rbclassroom.course.notebooks import KERNEL
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
 
-    The student's files are not changed. The file to submit has the locked cells of the original.
-    As in grading, the notebook runs in a folder with the files of the set only.
+    The file to submit has the locked cells of the original. As in grading, the notebook runs in a
+    folder with the files of the set only, but with the student's functions of earlier sets. The
+    functions that pass are added to ``my_motion.py``, beside the folder of the set.
     """
     if not path.is_file():
         raise ValueError(f"{path} is not a file; give the path of your notebook")
@@ -48,6 +51,8 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
         Path(own, "work").mkdir()
         for file, content in files.items():
             write_whole(Path(own, "work", file), content)
+        if (mine := find(path.parent)).is_file():
+            write_whole(Path(own, FILE), mine.read_bytes())
         remarks += _run(notebook, Path(own), seconds)
     print("".join(f"- {what}\n" for what in remarks), end="")
     passed = _print_problems(notebook, original)
@@ -55,6 +60,7 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     content = (nbformat.writes(notebook) + "\n").encode()
     target = write_whole(path.parent / "to_submit" / name, content)
     print(f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run in grading")
+    _keep(notebook, name.removesuffix(".ipynb"), files, path.parent)
     print(f"check again after each change; the file to hand in is {target}")
     return target
 
@@ -81,6 +87,26 @@ def _find_set(notebook: NotebookNode, folder: Path) -> tuple[str, dict[str, byte
     shared = {path: count_found(notebook, nbformat.read(path, 4)) for path in sources}
     best = max(sources, key=lambda path: shared[path])
     return best.name, release(best.stem, course)
+
+
+def _keep(notebook: NotebookNode, name: str, files: dict[str, bytes], folder: Path) -> None:
+    """Write the accepted functions of a set to the student's file."""
+    data = json.loads(files.get(f"{name}.json", b"{}"))
+    tests = [c for c in notebook.cells if is_test(c) and c.execution_count and not _error(c)]
+    code = [c.source for c in notebook.cells if c.cell_type == "code" and not is_test(c)]
+    mine = find(folder)
+    if not mine.is_file():
+        mine = (folder.parent if folder.name == name else folder) / FILE
+    passed = [grade_id(test).removesuffix("-test") for test in tests]
+    try:
+        text = mine.read_text("utf-8-sig") if mine.is_file() else ""
+        new, said = keep(text, name, data, code, passed)
+        if new != text:
+            write_whole(mine, new.encode())
+    except (OSError, ValueError) as error:
+        said = f"{FILE} is not changed: {error}"
+    if said:
+        print(f"{said} ({mine})")
 
 
 class _Client(BoundedClient):

@@ -17,7 +17,7 @@ def problem(name: str, slug: str) -> Problem | Sampler:
 
     If the table of the set is beside the folder, as in the course, the data are updated first.
     """
-    folder = _start()
+    folder = start_folder()
     if (folder.parent / f"{name}.toml").is_file():
         from rbclassroom.assignments.tables import update
 
@@ -27,14 +27,15 @@ def problem(name: str, slug: str) -> Problem | Sampler:
     if not file:
         raise NotYet(f"{name}.json is missing. Copy it from the handout into this folder.")
     data = json.loads(file.read_text("utf-8"), object_hook=_as_array)[slug]
-    data.pop("read", "")  # this is for the feedback page
+    for key in ("read", "keep", "doc"):  # these are for the feedback page and for my_motion.py
+        data.pop(key, "")
     data["mistakes"] = [Mistake(**mistake) for mistake in data["mistakes"]]
     if law := data.pop("law", None):
         return Sampler(**LAWS[law], **data)
     return (Drawing if data.pop("drawing") else Problem)(**data)
 
 
-def _start() -> Path:
+def start_folder() -> Path:
     """Return the folder in which the kernel was started; the code of a student may leave it."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     return Path(shell.starting_dir) if shell else Path.cwd()

@@ -2,10 +2,10 @@
 
 The table of the set ``NAME`` is the file ``NAME.toml`` beside its folder. Students do not get the
 table. It has a section ``SLUG`` for the problem with the cells ``SLUG-answer`` and ``SLUG-test``. A
-section has the inputs and common mistakes, and says in which lesson to `read` again. Each mistake
-has a hint, and the bodies of functions that make the mistake. The right answers come from the
-notebook. `own` says which functions an answer may use; students see it when an answer is right, and
-nothing checks it.
+section has the inputs and common mistakes, and says in which lesson to `read` again, and whether
+students `keep` their function for later sets. Each mistake has a hint, and the bodies of functions
+that make the mistake. The right answers come from the notebook. `own` says which functions an
+answer may use; students see it when an answer is right, and nothing checks it.
 """
 
 import copy
@@ -25,6 +25,7 @@ import numpy as np
 from rbclassroom.assignments.locked_cells import grade_id
 from rbclassroom.assignments.marking import curves_of, draw
 from rbclassroom.assignments.marking_samplers import LAWS, quantiles
+from rbclassroom.assignments.my_motion import only_course
 from rbclassroom.assignments.safe_files import write_whole
 
 DRAWS = 5000
@@ -59,8 +60,9 @@ def evaluate(folder: Path) -> dict[str, dict[str, Any]]:
     cells = {grade_id(cell): cell.source for cell in notebook.cells if cell.cell_type == "code"}
     answers = [text for name, text in cells.items() if name.endswith("-answer")]
     space: dict[str, Any] = {"__name__": "__main__"}
-    for text in (cells.get("setup", ""), *answers, table.pop("helpers", "")):
-        exec(compile(text, folder.name, "exec"), space)
+    with only_course():
+        for text in (cells.get("setup", ""), *answers, table.pop("helpers", "")):
+            exec(compile(text, folder.name, "exec"), space)
     found, own = {}, table.pop("own", "")
     for slug, problem in table.items():
         try:
@@ -90,6 +92,9 @@ def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> di
     if "law" not in known:
         known |= {"drawing": drawing, "names": names[drawing:], "inputs": inputs}
         known["answers"] = run(space[_name(answer)])
+    known["doc"] = space[_name(answer)].__doc__
+    if problem.get("keep"):
+        known["keep"] = _name(answer)
     known["mistakes"] = []
     for mistake in problem["mistakes"]:
         functions = (function_of(answer, code, space) for code in mistake["code"])

@@ -43,7 +43,7 @@ def needed(above: Sequence[ast.stmt], cell: Sequence[ast.stmt]) -> list[ast.stmt
     statements = [*above, *cell]
     read, bound = {}, {}
     for each in statements:
-        read[each], bound[each] = _names(each)
+        read[each], bound[each] = names_in(each)
     modules = set().union(*(bound[each] for each in above if isinstance(each, _IMPORT)))
     random = set().union(*(bound[each] for each in above if "default_rng" in ast.dump(each)))
     late = set[str]()  # names that are read when a function is called
@@ -145,7 +145,7 @@ def _told(error: BaseException) -> tuple[str, str]:
     return "error", "\n".join([*lines, "".join(traceback.format_exception_only(error))]).rstrip()
 
 
-def _names(statement: ast.stmt) -> tuple[set[str], set[str]]:
+def names_in(statement: ast.stmt) -> tuple[set[str], set[str]]:
     """Return the names that a statement reads but does not bind itself, and those it may bind."""
     tables = [symtable.symtable(ast.unparse(statement), "<statement>", "exec")]
     symbols = tables[0].get_symbols()
@@ -157,7 +157,7 @@ def _names(statement: ast.stmt) -> tuple[set[str], set[str]]:
         read |= {each.get_name() for each in symbols if each.is_referenced()}
     if isinstance(statement, ast.For):  # the loop assigns its target before the body reads it
         target = {node.id for node in ast.walk(statement.target) if isinstance(node, ast.Name)}
-        read = read - target | _names(ast.Expr(statement.iter))[0]
+        read = read - target | names_in(ast.Expr(statement.iter))[0]
     return read, bound
 
 

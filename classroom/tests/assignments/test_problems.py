@@ -149,7 +149,7 @@ def examples():
         ("ps1", "plan"): ", ".join(f"${place(pose)}$" for pose in poses),
         ("ps1", "short"): "is {:.4g}. Half-way from 20 to 385 it is {:.4g}.".format(*short),
         ("ps1", "angles"): f"the result is, rounded, ${place(arm, '.2f')}$",
-        ("ps2", "turn"): in_tex(two["turn_about"](np.ones(3), 2 * np.pi / 3)),
+        ("ps2", "turn"): in_tex(two["exp_so3"](2 * np.pi / 3 * np.ones(3) / np.sqrt(3))),
         ("ps2", "far"): f"is at the distance {two['how_far'](mirror):.9g}",
     }
 

@@ -84,7 +84,7 @@ addEventListener("DOMContentLoaded", () => {
     return part;
   }
 
-  const isTest = (cell) => cell.matches(".tag_test");
+  const isTest = (cell) => cell.matches(".tag_test"), answers = new Map(), file = "my_motion.py";
   let data;
   const page = async () => (data ??= await (await fetch(`${engine.folder}pages/${name}.json`)).json()); // of a problem set
   // Return what Python needs to run a cell: the texts above, and its own text. An answer is followed by its test.
@@ -92,7 +92,8 @@ addEventListener("DOMContentLoaded", () => {
     const at = cells.indexOf(cell), test = cells.findIndex((each, k) => k > at && isTest(each));
     const above = cells.slice(0, at).filter((each) => !isTest(each)), own = cells.slice(at, Math.max(at, test) + 1);
     const [before, source] = [above, own].map((some) => some.map((each) => texts.get(each)));
-    return { above: before, source: source.join("\n\n"), files: test > at ? (await page()).files : {} };
+    const files = answers.size ? { ...(await page()).files, [file]: functions() } : {};
+    return { above: before, source: source.join("\n\n"), files };
   }
 
   // Make the editor of a cell, its buttons and its outputs. Without a word for the first button, the cell does not run.
@@ -160,10 +161,29 @@ addEventListener("DOMContentLoaded", () => {
   const key = (id) => `${location.pathname} ${id}`;
   const stored = (id) => { try { return localStorage.getItem(key(id)); } catch { return null; } };
   let forbidden = false;
+  // The file of all sets with the student's own functions: the browser stores it beside the answers.
+  const place = `${location.pathname.replace(/[^/]*$/, "")}${file}`;
+  let whole;
+  const functions = () => { try { return localStorage.getItem(place) ?? ""; } catch { return whole ?? ""; } };
+  async function keep() {
+    const passed = [...answers].filter(([, answer]) => !answer.isOpen()).map(([id]) => id.replace(/-answer$/, ""));
+    const given = { name, passed, cells: cells.filter((part) => !isTest(part)).map((part) => texts.get(part)) };
+    const files = { ...(await page()).files, [file]: functions(), "answers.json": JSON.stringify(given) };
+    let out = "";
+    const source = "from rbclassroom.assignments.my_motion import kept\nprint(kept())";
+    await engine.run({ above: [], source, files }, (kind, text) => (out += kind === "text" ? text : ""));
+    const [text, said] = JSON.parse(out);
+    whole = text;
+    try { localStorage.setItem(place, text); } catch { forbidden = true; }
+    tell();
+    if (said) status.textContent += ` ${said}.`;
+  }
   const store = (id, text) => { try { localStorage.setItem(key(id), text); } catch { forbidden = true; } };
-  const answers = new Map(), status = make("p", { className: "kept", role: "status" });
+  const status = make("p", { className: "kept", role: "status" });
+  const mine = button(`Download ${file}`, () => give(functions(), file, "text/x-python"));
   const tell = () => {
     const open = [...answers.values()].filter((answer) => answer.isOpen()).length;
+    mine.hidden = !functions();
     status.textContent = forbidden
       ? "This browser does not keep your answers, perhaps because the window is private. Download them before you close the window."
       : stored("downloaded")
@@ -182,6 +202,7 @@ addEventListener("DOMContentLoaded", () => {
     const passed = (shown) => {
       shown.classList.add("right");
       store(`${id} right`, texts.get(part));
+      keep().catch((error) => (status.textContent = `${file} is not changed: ${error.message}.`));
     };
     const sure = () => confirm("Delete this answer and begin again?");
     const answer = runnable(part, { label: `Answer to ${heading}`, word: words ? "" : "Check", stub, sure, changed, passed });
@@ -200,14 +221,16 @@ addEventListener("DOMContentLoaded", () => {
     for (const [id, { put, edit }] of answers) if (at === key(id) && text !== null) put(text), edit(text);
   });
 
+  function give(text, download, type) {
+    make("a", { href: URL.createObjectURL(new Blob([text], { type })), download }).click();
+  }
   async function download() {
     const { notebook } = structuredClone(await page());
     for (const cell of notebook.cells) {
       const answer = answers.get(cell.metadata.nbgrader?.grade_id), text = texts.get(answer?.part);
       if (answer && text !== answer.stub) cell.source = text;
     }
-    const file = new Blob([JSON.stringify(notebook, null, 1) + "\n"], { type: "application/x-ipynb+json" });
-    make("a", { href: URL.createObjectURL(file), download: `${name}.ipynb` }).click();
+    give(JSON.stringify(notebook, null, 1) + "\n", `${name}.ipynb`, "application/x-ipynb+json");
     store("downloaded", "yes");
     tell();
   }
@@ -221,7 +244,7 @@ addEventListener("DOMContentLoaded", () => {
   field.onchange = () => open(field.files[0]).catch((error) => (status.textContent = `The file was not opened: ${error.message}.`)).finally(() => (field.value = ""));
   const save = button(`Download ${name}.ipynb`, () => download().catch((error) =>
     (status.textContent = engine.missing() || `Nothing was downloaded: ${error.message}. Try again.`)));
-  const end = make("div", { className: "hand-in" }, make("div", { className: "bar" }, save, button("Open a downloaded file", () => field.click()), field), status);
+  const end = make("div", { className: "hand-in" }, make("div", { className: "bar" }, save, button("Open a downloaded file", () => field.click()), field, mine), status);
   (document.querySelector("#before-you-hand-in") ?? document.querySelector("article")).append(end);
   tell();
 });

@@ -1,0 +1,221 @@
+"""Test the file with a student's own functions: it grows, and later sets use it."""
+
+import base64
+import json
+import re
+import shutil
+from pathlib import Path
+
+import nbformat
+import numpy as np
+import pytest
+from test_problems import SETS, SOURCE, TABLES, cells
+from test_sets_graded import regions
+
+from rbclassroom.assignments import comparison, my_motion, twins
+from rbclassroom.assignments.check import check
+from rbclassroom.assignments.handout import build_wheel, release
+from rbclassroom.assignments.my_motion import FILE, keep, mine, only_course
+from rbclassroom.assignments.tables import update
+from rbcourse import acceleration_cost, exp_so3, minimum_acceleration, projected_cubic
+
+ORDER = [f"ps{number}" for number in (1, 2, 3, 4, 8, 5, 6, 7, 9)]
+
+
+def data_of(name):
+    update(SOURCE / name)
+    return json.loads((SOURCE / name / f"{name}.json").read_text("utf-8"))
+
+
+def answers(name):
+    """Return the code of a student whose answers are the model answers."""
+    found = [cell.source for key, cell in cells(name).items() if key.endswith("-answer")]
+    code = [cells(name)["setup"].source, *(text for text in found if "def " in text)]
+    return [re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text) for text in code]
+
+
+def after(text, name, passed=None):
+    return keep(text, name, data_of(name), answers(name), passed or [*TABLES[name]], "Ada")[0]
+
+
+@pytest.fixture(scope="module")
+def whole():
+    text = ""
+    for name in ORDER:
+        text = after(text, name)
+    return text
+
+
+def test_the_file_of_all_sets_draws_figure_5_with_the_costs_of_the_package(whole):
+    assert "By Ada." in whole
+    assert whole.count("\n") < 250
+    assert not re.search("rbcourse|rbclassroom|SOLUTION", whole)
+    space = {}
+    exec(whole, space)
+    ends = np.eye(3), exp_so3([np.pi / 6, 2 * np.pi / 3, np.pi / 2]), [1.0, 2, 3], [2.0, 1, 1]
+    best, near = minimum_acceleration(*ends), projected_cubic(*ends)
+    wanted = [acceleration_cost(best), acceleration_cost(near)]
+    costs = space["both_costs"](*map(np.array, ends), 36)
+    np.testing.assert_allclose(costs, wanted, rtol=1e-8)
+    assert round(costs[1] / costs[0], 2) == 1.77
+
+
+def test_a_set_that_is_kept_again_does_not_change_the_file(whole):
+    text = f"{whole}\n\ndef own():\n    return 'mine'\n"
+    for name in ORDER:
+        text = after(text, name)
+    assert text == f"{whole}\n\ndef own():\n    return 'mine'\n"
+
+
+def test_a_late_starter_borrows_functions_until_the_own_ones_pass():
+    text = after("", "ps5")
+    (line,) = (line for line in text.splitlines() if "rbclassroom" in line)
+    assert "import hat_so3, log_so3, nearest_rotation " in line
+    exec(text, {})
+    assert "rbclassroom" not in after(text, "ps2")
+
+
+def test_only_accepted_functions_are_kept_and_none_is_lost():
+    text = after("", "ps4", ["geodesic", "screw"])
+    assert "def screw" in text
+    assert "def projected_line" not in text
+    unchanged, said = keep(text, "ps4", data_of("ps4"), answers("ps4"), ["screw"])
+    assert (unchanged, said) == (
+        text,
+        f"{FILE} keeps your earlier part of ps4, since geodesic fails now",
+    )
+    assert keep("", "ps4", data_of("ps4"), answers("ps4"), ["theta"]) == ("", "")
+
+
+def test_code_with_another_meaning_is_not_overwritten():
+    text = f"{after('', 'ps2')}\n\ndef coupling(Q):\n    return 'another meaning'\n"
+    same, said = keep(text, "ps7", data_of("ps7"), answers("ps7"), ["spline"])
+    assert (same, said) == (
+        text,
+        f"{FILE} is not changed: it has another coupling; rename yours in ps7",
+    )
+    broken = text.replace("import numpy", "import numpy as")
+    assert "its line" in keep(broken, "ps7", data_of("ps7"), answers("ps7"), ["spline"])[1]
+
+
+def test_helpers_comments_and_imports_of_the_student_come_along():
+    cell = """%matplotlib inline
+from math import pi, tau
+
+# half a turn
+HALF = pi
+
+
+def circle(x):
+    return scale * x
+
+
+scale, unused = HALF / tau, tau
+"""
+    theirs = "def geodesic(R0, R1, t):\n    # YOUR CODE HERE\n    return circle(t)\n"
+    given = [cell, theirs, "a scratch cell with an error"]
+    text, _ = keep("", "ps4", data_of("ps4"), given, ["geodesic"])
+    assert "# half a turn\nHALF = pi\n" in text
+    assert "YOUR CODE" not in text
+    space = {}
+    exec(text, space)
+    assert space["geodesic"](0, 0, 4) == 2
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "ps4").mkdir()
+    monkeypatch.setattr(my_motion, "start_folder", lambda: tmp_path / "ps4")
+    return tmp_path
+
+
+def test_a_later_set_uses_right_functions_and_replaces_others(folder, capsys):
+    assert mine("exp_so3") is twins.exp_so3
+    assert "does not contain them yet" in capsys.readouterr().out
+    right = (
+        "def vee_so3(A):\n    K = (A - A.T) / 2\n    return np.array([K[2, 1], K[0, 2], K[1, 0]])\n"
+    )
+    wrong = "def hat_so3(w):\n    return np.zeros((3, 3))\n"
+    shorter = "def cubic(p0, p1):\n    return p0\n"
+    text = f"import numpy as np\n{right}\n{wrong}\n{shorter}"
+    (folder / FILE).write_text(text, "utf-8")
+    vee, hat, log, cubic = mine("vee_so3", "hat_so3", "log_so3", "cubic")
+    assert vee.__module__ == "my_motion"
+    assert (hat, log, cubic) == (twins.hat_so3, twins.log_so3, twins.cubic)
+    assert capsys.readouterr().out.splitlines() == [
+        f"vee_so3: your own, from {FILE}",
+        "hat_so3, cubic: the course's, because yours give other results",
+        f"log_so3: the course's, because {FILE} does not contain them yet",
+    ]
+    with only_course():
+        assert mine("vee_so3") is twins.vee_so3
+    (folder / FILE).write_text("1 / 0", "utf-8")
+    assert mine("vee_so3") is twins.vee_so3
+    assert f"{FILE} stops: ZeroDivisionError" in capsys.readouterr().out
+
+
+def test_the_check_writes_the_file_and_the_next_set_uses_it(tmp_path, capsys):
+    course = tmp_path / "course"
+    shutil.copytree(SOURCE, course / "source")
+    shutil.copy(SOURCE.parent / "nbgrader_config.py", course)
+    for name in ("ps2", "ps4"):
+        files = release(name, course)
+        for path, content in files.items():
+            for place in (tmp_path / name, tmp_path / name / "original"):
+                place.mkdir(exist_ok=True)
+                (place / path).write_bytes(content)
+        notebook = nbformat.reads(files[f"{name}.ipynb"].decode(), 4)
+        for cell in notebook.cells:
+            if cell.cell_type == "code" and cell.metadata.nbgrader.solution:
+                text = cells(name)[cell.metadata.nbgrader.grade_id].source
+                cell.source = re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text)
+        nbformat.write(notebook, tmp_path / name / f"{name}.ipynb")
+        submitted = check(tmp_path / name / f"{name}.ipynb")
+        assert f"{FILE} has your" in capsys.readouterr().out
+    assert "def screw" in (tmp_path / FILE).read_text("utf-8")
+    outputs = [cell.get("outputs") for cell in nbformat.read(submitted, 4).cells]
+    assert f"exp_so3, log_so3, nearest_rotation: your own, from {FILE}" in str(outputs)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_each_set_keeps_functions_and_ends_with_a_comparison(name, capsys):
+    space = {}
+    for text in answers(name):
+        exec(text, space)
+    capsys.readouterr()
+    exec(cells(name)["compare-table"].source, space)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) >= 4
+    assert not re.search("fails|written", "\n".join(lines))
+    assert cells(name)["compare"].source.count("?") == 1
+    empty = cells(name)["compare-table"].source.partition('"')[2].partition('"')[0]
+    comparison.compare(empty, lambda *_: 1 / 0)
+    assert "fails" in capsys.readouterr().out
+    title = cells(name)["title"].source
+    kept = [each["keep"] for each in data_of(name).values() if "keep" in each]
+    assert kept
+    for function in kept:
+        assert f"`{function}`" in title
+
+
+def test_the_page_for_teachers_has_the_thread():
+    page = (SOURCE.parent / "README.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| (ps\d) \| (`.*?`) \|", page, re.MULTILINE))
+    assert [*rows] == ORDER
+    for name, functions in rows.items():
+        kept = [each["keep"] for each in data_of(name).values() if "keep" in each]
+        assert sorted(re.findall(r"`(\w+)`", functions)) == sorted(kept)
+
+
+def test_no_handout_reveals_an_answer():
+    """Search the files of the sets and the wheel of the classroom: plain, reversed, as base64."""
+    secrets = {line for name in SETS for line in regions(name, "SOLUTION") if len(line) >= 30}
+    files = {
+        name: content for each in SETS for name, content in release(each, SOURCE.parent).items()
+    }
+    _, files["wheel"] = build_wheel(Path(__file__).parents[2])
+    own = [path.read_text("utf-8") for path in Path(my_motion.__file__).parent.glob("*.py")]
+    text = "\n".join([*(each.decode("utf-8", "ignore") for each in files.values()), *own])
+    for secret in secrets:
+        coded = base64.b64encode(secret.encode()).decode()[4:-4]
+        assert not any(each in text for each in (secret, secret[::-1], coded)), secret
