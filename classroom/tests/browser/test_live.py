@@ -310,6 +310,28 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
     assert (row["automatic"], row["by hand"], row["remarks"]) == ("17", "tip-words-answer", "")
 
 
+def test_functions_of_a_set_stay_in_the_browser_for_later_sets(page, address, tmp_path):
+    opened(page, address, "problems/ps2.html")
+    own = page.get_by_role("button", name="Download my_motion.py")
+    expect(own).to_be_hidden()
+    for number, slug in enumerate(("hat", "vee")):
+        text = cells("ps2")[f"{slug}-answer"].source
+        write(page, number, re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text).strip())
+        page.get_by_role("button", name="Check").nth(number).click()
+        expect(page.locator(".outputs.right")).to_have_count(number + 1)
+    expect(page.locator(".kept")).to_contain_text("my_motion.py has your hat_so3, vee_so3")
+    with page.expect_download() as downloading:
+        own.click()
+    downloading.value.save_as(tmp_path / "my_motion.py")
+    text = (tmp_path / "my_motion.py").read_text("utf-8")
+    assert re.findall(r"^def (\w+)", text, re.MULTILINE) == ["hat_so3", "vee_so3"]
+    opened(page, address, "problems/ps8.html")
+    expect(page.get_by_role("button", name="Download my_motion.py")).to_be_visible()
+    setup = page.locator(".tag_try-setup")
+    setup.get_by_role("button", name="Try it").click()
+    expect(setup.locator(".outputs pre")).to_have_text("hat_so3, vee_so3: your own, from my_motion.py")
+
+
 def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
     """Search for hidden tests, mark schemes and model answers: plain, reversed or as base64."""
     kinds = "SOLUTION|HIDDEN TESTS|MARK SCHEME"
