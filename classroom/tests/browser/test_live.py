@@ -325,6 +325,10 @@ def test_functions_of_a_set_stay_in_the_browser_for_later_sets(page, address, tm
     downloading.value.save_as(tmp_path / "my_motion.py")
     text = (tmp_path / "my_motion.py").read_text("utf-8")
     assert re.findall(r"^def (\w+)", text, re.MULTILINE) == ["hat_so3", "vee_so3"]
+    table = page.locator(".tag_try-compare-table")
+    table.get_by_role("button", name="Try it").click()
+    expect(table.locator(".outputs pre")).to_contain_text("not written")  # log_so3 is empty
+    expect(table.locator(".outputs pre")).to_contain_text("SciPy's")
     opened(page, address, "problems/ps8.html")
     expect(page.get_by_role("button", name="Download my_motion.py")).to_be_visible()
     setup = page.locator(".tag_try-setup")
