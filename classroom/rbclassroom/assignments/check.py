@@ -4,7 +4,6 @@ Students run this module before they submit. It does not need nbgrader.
 """
 
 import io
-import json
 import logging
 import os
 import re
@@ -60,7 +59,8 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     content = (nbformat.writes(notebook) + "\n").encode()
     target = write_whole(path.parent / "to_submit" / name, content)
     print(f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run in grading")
-    _keep(notebook, name.removesuffix(".ipynb"), files, path.parent)
+    stem = name.removesuffix(".ipynb")
+    _keep(notebook, stem, files.get(f"{stem}.json", b"{}"), path.parent)
     print(f"check again after each change; the file to hand in is {target}")
     return target
 
@@ -89,18 +89,16 @@ def _find_set(notebook: NotebookNode, folder: Path) -> tuple[str, dict[str, byte
     return best.name, release(best.stem, course)
 
 
-def _keep(notebook: NotebookNode, name: str, files: dict[str, bytes], folder: Path) -> None:
+def _keep(notebook: NotebookNode, name: str, data: bytes, folder: Path) -> None:
     """Write the accepted functions of a set to the student's file."""
-    data = json.loads(files.get(f"{name}.json", b"{}"))
-    tests = [c for c in notebook.cells if is_test(c) and c.execution_count and not _error(c)]
-    code = [c.source for c in notebook.cells if c.cell_type == "code" and not is_test(c)]
-    mine = find(folder)
-    if not mine.is_file():
-        mine = (folder.parent if folder.name == name else folder) / FILE
-    passed = [grade_id(test).removesuffix("-test") for test in tests]
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    own = [(grade_id(c), c.source) for c in code if is_answer(c) or grade_id(c) in ("", "setup")]
+    tests = [grade_id(c) for c in code if is_test(c) and c.execution_count and not _error(c)]
+    mine = find(folder, name)
     try:
         text = mine.read_text("utf-8-sig") if mine.is_file() else ""
-        new, said = keep(text, name, data, code, passed)
+        passed = [test.removesuffix("-test") for test in tests]
+        new, said = keep(text, name, data.decode(), own, passed)
         if new != text:
             write_whole(mine, new.encode())
     except (OSError, ValueError) as error:

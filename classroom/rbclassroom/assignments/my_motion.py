@@ -1,11 +1,13 @@
 """Collect the accepted functions of a student in ``my_motion.py``, and lend them to later sets.
 
-The file begins with a docstring and imports. The part of a set begins with a line such as
-``# %% ps2``, and contains the functions that the table of the set marks with ``keep``, with the
-student's own helpers. The check replaces this part. It does not change the text below `OWN`.
+The file begins with a docstring and imports. The part of a set begins with a line with the name of
+the set, the date, and the accepted functions, which the table of the set marks with ``keep``. The
+part contains their code, with the helpers that it needs. The check replaces it, but does not change
+the text below the line `OWN`.
 """
 
 import ast
+import builtins
 import contextlib
 import copy
 import getpass
@@ -15,15 +17,15 @@ import json
 import re
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from rbclassroom.assignments import twins
-from rbclassroom.assignments.problems import start_folder
-from rbclassroom.live.cells import names_in
+from rbclassroom.assignments.problems import loaded, made, start_folder
+from rbclassroom.live.cells import names_in, needed
 from rbcourse import exp_so3
 
 FILE = "my_motion.py"
@@ -33,7 +35,8 @@ _HEAD = '''"""My motions: the functions that I wrote in the problem sets on rota
 By {by}. The check writes the parts of the sets. Write other functions below the last line.
 """
 '''
-_LENT = "  # the course's, until yours have passed"
+_PART = r"^(?=# %% \S+ · \d{4}-\d\d-\d\d · )"
+_LENT = "from rbclassroom.assignments.twins import {}  # the course's"
 _only_course = False
 
 
@@ -54,192 +57,243 @@ def mine(*names: str) -> Any:
     lent = {name: getattr(twins, name) for name in names}
     if not _only_course:
         own, fault = _load()
-        right = [name for name in names if name in own and _agree(own[name], lent[name])]
-        wrong = [name for name in names if name in own and name not in right]
-        missing = fault or f"{FILE} does not contain them yet"
+        there = [name for name in names if own.get(name, lent[name]) is not lent[name]]
+        right = [name for name in there if _agree(own[name], lent[name])]
         cases = {
             f"your own, from {FILE}": right,
-            "the course's, because yours give other results": wrong,
-            f"the course's, because {missing}": [name for name in names if name not in own],
+            "the course's, because yours give other results": [
+                name for name in there if name not in right
+            ],
+            f"the course's, because {fault or f'{FILE} does not contain them yet'}": [
+                name for name in names if name not in there
+            ],
         }
         print("\n".join(f"{', '.join(some)}: {case}" for case, some in cases.items() if some))
         lent |= {name: own[name] for name in right}
     return tuple(lent.values()) if len(names) > 1 else lent[names[0]]
 
 
-def find(folder: Path) -> Path:
-    """Return the path of the student's file: in the folder of a set, or beside this folder."""
-    own, beside = folder / FILE, folder.parent / FILE
-    return beside if beside.is_file() else own
+def find(folder: Path, name: str = "") -> Path:
+    """Return the path of the student's file for the folder of a set.
+
+    It is in this folder, or in a folder above. If there is none, it will be beside the folder.
+    """
+    for place in (folder, *folder.parents[:2]):
+        if (place / FILE).is_file():
+            return place / FILE
+    while name and folder.name.startswith(name):  # some programs unpack ps1 to ps1/ps1
+        folder = folder.parent
+    return folder / FILE
 
 
 def _load() -> tuple[dict[str, Any], str]:
     """Return the names that the student's file defines, or the reason why it cannot be used."""
     path, space = find(start_folder()), {"__name__": "my_motion"}
-    if not path.is_file():
-        return {}, ""
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            exec(compile(path.read_text("utf-8"), str(path), "exec"), space)
-    except Exception as error:
+            if path.is_file():
+                exec(compile(path.read_text("utf-8-sig"), str(path), "exec"), space)
+    except (Exception, SystemExit) as error:
         return {}, f"{FILE} stops: {type(error).__name__}: {error}"
     return space, ""
 
 
 def _agree(function: Any, twin: Callable[..., Any]) -> bool:
     """Compare two functions for five arguments; the first vectors are 0, and rotations are I."""
-    rng = np.random.default_rng(1)
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        try:
-            for k in range(5):
-                R, M = exp_so3(k * rng.normal(size=3)), rng.normal(size=(3, 3))
-                kinds: dict[str, Any] = {"R": R, "M": M, "A": M, "t": rng.random()}
-                names = inspect.signature(twin).parameters
-                given = [kinds.get(name[0], k * rng.normal(size=3)) for name in names]
-                if not np.allclose(function(*given), twin(*given), rtol=0, atol=1e-7):
+    rng, names = np.random.default_rng(1), inspect.signature(twin).parameters
+    with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()):
+        for size in range(5):
+            given = [_argument(name, size, rng) for name in names]
+            right = twin(*given)
+            try:
+                got = np.asarray(function(*copy.deepcopy(given)))
+                if got.shape != right.shape or not np.allclose(got, right, rtol=0, atol=1e-7):
                     return False
-        except Exception:
-            return False
+            except Exception:
+                return False
     return True
+
+
+def _argument(name: str, size: float, rng: np.random.Generator) -> Any:
+    if name == "t":
+        return rng.random()
+    if name in "AM":
+        return rng.normal(size=(3, 3))
+    vector = size * rng.normal(size=3)
+    return exp_so3(vector) if name[0] == "R" else vector
 
 
 def kept() -> str:
     """Return, in a page, the student's file after a check and a message, as JSON."""
-    given, text = json.loads(Path("answers.json").read_text("utf-8")), Path(FILE).read_text("utf-8")
-    data = json.loads(Path(f"{given['name']}.json").read_text("utf-8"))
-    by = "(write your name here)"
+    given = json.loads(Path("answers.json").read_text("utf-8"))
+    data = Path(f"{given['name']}.json").read_text("utf-8")
+    text, by = Path(FILE).read_text("utf-8"), "(write your name here)"
     return json.dumps(keep(text, given["name"], data, given["cells"], given["passed"], by))
 
 
 def keep(
     text: str,
     name: str,
-    data: dict[str, Any],
-    cells: Sequence[str],
+    data: str,
+    cells: Sequence[tuple[str, str]],
     passed: Sequence[str],
     by: str = "",
 ) -> tuple[str, str]:
     """Return the text of the student's file with the accepted functions of a set, and a message.
 
-    Parameters
-    ----------
-    text : str
-        The text of the file before; it may be empty.
-    name : str
-        The name of the set.
-    data : dict
-        The data of the set, from ``NAME.json``.
-    cells : sequence of str
-        The code of the student, without tests.
-    passed : sequence of str
-        The problems whose tests have passed.
-    by : str, optional
-        The name of the student; by default, the name of the account.
+    `text` is the file before; it may be empty. `name` is the name of the set, and `data` the text
+    of its ``NAME.json``. `cells` has names and code of the student's cells, and `passed` the
+    problems whose tests have passed. The new file is run, and must pass these tests, too.
     """
-    problems = {slug: each for slug, each in data.items() if isinstance(each, dict)}
-    keeps = {each["keep"]: slug in passed for slug, each in problems.items() if "keep" in each}
-    wanted = [function for function, right in keeps.items() if right]
-    if not wanted:
-        return text, ""
     try:
-        head, parts, own = _split(text or _HEAD.format(by=by or getpass.getuser()))
-        old = parts.pop(name, "")
-        others, before = _Definitions([head, own, *parts.values()]), _Definitions([old])
-    except SyntaxError as error:
-        return text, f"{FILE} is not changed: its line {error.lineno} is not Python"
-    if lost := [each for each in keeps if each in before.code and each not in wanted]:
-        return text, f"{FILE} keeps your earlier part of {name}, since {lost[0]} fails now"
-    mine = _Definitions(filter(_is_python, cells), [each.get("doc") for each in problems.values()])
-    needed = [key for key in mine.needed_by(wanted) if not others.has_same(mine, key)]
-    if clash := [key for key in needed if key in others.code]:
-        return text, f"{FILE} is not changed: it has another {clash[0]}; rename yours in {name}"
-    imports = [mine.code[key] for key in needed if mine.is_import(key)]
-    code = [mine.code[key] for key in needed if not mine.is_import(key)]
-    part = "\n\n".join(dict.fromkeys(code))
-    day = time.strftime("%Y-%m-%d")
-    parts[name] = old if old.partition("\n")[2] == part else f"# %% {name} · {day}\n{part}"
-    head = "\n".join([head, *(line for line in imports if line not in head)])
-    body = [*(parts[key] for key in sorted(parts)), own]
-    lent = sorted(_Definitions([head, *body]).missing() & {*twins.__all__})
-    if lent:
-        head += f"\nfrom rbclassroom.assignments.twins import {', '.join(lent)}{_LENT}"
-    return "\n\n".join([head, *body]) + "\n", f"{FILE} has your {', '.join(wanted)}"
+        new, functions = _grown(text, name, data, cells, passed, by or _account())
+        return new, f"{FILE} has your {', '.join(functions)}" if functions else ""
+    except _Unchanged as why:
+        return text, f"{FILE} is not changed: {why}"
+
+
+class _Unchanged(Exception):
+    """The reason why the file is not changed."""
+
+
+class _Statement(NamedTuple):
+    node: ast.stmt
+    code: str
+    reads: set[str]
+    binds: set[str]
+
+    @property
+    def is_import(self) -> bool:
+        return isinstance(self.node, ast.Import | ast.ImportFrom)
+
+
+def _grown(
+    text: str,
+    name: str,
+    data: str,
+    cells: Sequence[tuple[str, str]],
+    passed: Sequence[str],
+    by: str,
+) -> tuple[str, list[str]]:
+    problems = {slug: each for slug, each in loaded(data).items() if isinstance(each, dict)}
+    wanted = {k: each["keep"] for k, each in problems.items() if "keep" in each and k in passed}
+    if not wanted:
+        return text, []
+    head, parts, own = _split(text.strip() or _HEAD.format(by=by) + f"\n{OWN}")
+    old = parts.pop(name, "")
+    accepted = old.partition("\n")[0].split(" · ")[-1].split(", ") if old else []
+    if lost := [each for each in accepted if each not in wanted.values()]:
+        raise _Unchanged(f"{lost[0]}, of your earlier {name}, fails now")
+    kept = _needed(cells, wanted, [each.get("doc") for each in problems.values()])
+    _refuse_clashes(kept, [*parts.values(), own])
+    code = "\n\n".join(each.code for each in kept if not each.is_import)
+    title = f"# %% {name} · {time.strftime('%Y-%m-%d')} · {', '.join(wanted.values())}"
+    same = accepted == [*wanted.values()] and old.partition("\n")[2] == code
+    parts[name] = old if same else f"{title}\n{code}"
+    body = "\n\n".join([*(parts[key] for key in sorted(parts)), own])
+    new = f"{_with_imports(head, kept, body)}\n\n{body}\n"
+    _test(new, {function: problems[slug] for slug, function in wanted.items()})
+    return new, [*wanted.values()]
+
+
+def _account() -> str:
+    try:
+        return re.sub(r'[\\"]', " ", getpass.getuser())
+    except (ImportError, KeyError, OSError):
+        return "me"
 
 
 def _split(text: str) -> tuple[str, dict[str, str], str]:
     """Return the head of the file, the parts of the sets, and the student's own text."""
-    text, _, own = text.partition(OWN)
-    head, *parts = re.split(r"^(?=# %% ps)", text, flags=re.MULTILINE)
-    head = "\n".join(line for line in head.strip().splitlines() if not line.endswith(_LENT))
-    return head, {part.split()[2]: part.strip() for part in parts}, f"{OWN}{own}".strip()
-
-
-def _plain(cell: str) -> str:
-    """Return the code of a cell without commands of Jupyter."""
-    return re.sub(r"^[%!].*$", "", cell, flags=re.MULTILINE)
-
-
-def _is_python(cell: str) -> bool:
     try:
-        return bool(ast.parse(_plain(cell)))
-    except SyntaxError:
-        return False
+        ast.parse(text)
+    except (SyntaxError, ValueError) as error:
+        raise _Unchanged(f"it is not Python: {error}") from None
+    theirs, mark, own = text.partition(OWN)
+    head, *parts = re.split(_PART, theirs, flags=re.MULTILINE)
+    found = {part.split()[2]: part.strip() for part in parts}
+    if not mark or len(found) < len(parts):
+        raise _Unchanged(f"a set has two parts, or the line “{OWN}” is missing")
+    return head.strip(), found, f"{mark}{own}"
 
 
-class _Definitions:
-    """The code that defines each name of some cells, without docstrings that are given."""
+def _read(text: str, given: Sequence[str | None] = ()) -> list[_Statement]:
+    """Return the statements of a cell, without given docstrings; [] if it is not Python."""
+    plain = re.sub(r"^([ \t]*)(?:[%!?].*|.*\?)$", r"\1pass", text, flags=re.MULTILINE)
+    for lines in (
+        text.split("\n"),
+        plain.split("\n"),
+    ):  # the second time without Jupyter's commands
+        with contextlib.suppress(SyntaxError, ValueError, RecursionError):
+            nodes = ast.parse("\n".join(lines)).body
+            return [_Statement(x, _code_of(x, lines, given), *names_in(x)) for x in nodes]
+    return []
 
-    def __init__(self, cells: Iterable[str], given: Sequence[str | None] = ()) -> None:
-        self.code, self._nodes = dict[str, str](), dict[str, ast.stmt]()
-        self._reads, self._given = dict[str, set[str]](), given
-        for text in map(_plain, cells):
-            for node in ast.parse(text).body:
-                if isinstance(node, ast.Import | ast.ImportFrom):
-                    self._add_import(node)
-                elif not isinstance(node, ast.Expr):
-                    self._add(node, self._code_of(node, text.splitlines()))
 
-    def _add_import(self, node: ast.Import | ast.ImportFrom) -> None:
-        if (getattr(node, "module", "") or "").partition(".")[0] in ("my_motion", "rbclassroom"):
-            return
-        for alias in node.names:  # one line for each name
-            single = copy.copy(node)
-            single.names = [alias]
-            self._add(single, ast.unparse(single))
+def _code_of(node: ast.stmt, lines: list[str], given: Sequence[str | None]) -> str:
+    """Return the lines of a statement, with decorators and with the comment above."""
+    first = min(each.lineno for each in [node, *getattr(node, "decorator_list", [])]) - 1
+    while first and re.match(r"#(?! %%)", lines[first - 1]):
+        first -= 1
+    kept = dict(enumerate(lines[first : node.end_lineno], first + 1))
+    if isinstance(node, ast.FunctionDef) and (ast.get_docstring(node) or "no text") in given:
+        start, end = node.body[0].lineno, node.body[0].end_lineno or 0
+        if lines[start - 1].strip().startswith('"""') and lines[end - 1].endswith('"""'):
+            kept = {number: line for number, line in kept.items() if not start <= number <= end}
+    return "\n".join(line for line in kept.values() if line.strip() != "# YOUR CODE HERE")
 
-    def _add(self, node: ast.stmt, code: str) -> None:
-        reads, binds = names_in(node)
-        if "mine" not in reads:
-            for name in binds:
-                self.code[name], self._nodes[name], self._reads[name] = code, node, reads
 
-    def _code_of(self, node: ast.stmt, lines: list[str]) -> str:
-        """Return the lines of a statement, with decorators and with the comment above."""
-        first = min(each.lineno for each in [node, *getattr(node, "decorator_list", [])]) - 1
-        while first and re.match(r"#(?! %%)", lines[first - 1]):
-            first -= 1
-        kept = dict(enumerate(lines[first : node.end_lineno], first + 1))
-        if isinstance(node, ast.FunctionDef) and ast.get_docstring(node, False) in self._given:
-            for number in range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1):
-                del kept[number]
-        return "\n".join(line for line in kept.values() if line.strip() != "# YOUR CODE HERE")
+def _needed(
+    cells: Sequence[tuple[str, str]], wanted: dict[str, str], given: Sequence[str | None]
+) -> list[_Statement]:
+    """Return the statements that the wanted functions need, in the order of the cells."""
+    read = [(cell, each) for cell, text in cells for each in _read(text, given)]
+    course = re.compile(r"from (rbclassroom|my_motion)\b|import my_motion\b|.*= mine\(")
+    read = [(cell, each) for cell, each in read if not course.match(ast.unparse(each.node))]
+    kept = list[ast.stmt]()
+    for slug, function in wanted.items():
+        ends = [k for k, (cell, _) in enumerate(read, 1) if cell == f"{slug}-answer"]
+        above = [each for _, each in read[: max(ends, default=0)]]
+        target = [each.node for each in above if function in each.binds][-1:]
+        nodes = [each.node for each in above]
+        kept += [*needed(nodes, target), *target]
+        kept += [each.node for each in above if each.is_import and "*" in each.code]
+    return [each for _, each in read if each.node in kept]
 
-    def is_import(self, name: str) -> bool:
-        return isinstance(self._nodes[name], ast.Import | ast.ImportFrom)
 
-    def has_same(self, others: Self, name: str) -> bool:
-        pair = [some._nodes.get(name, ast.Pass()) for some in (self, others)]
-        return ast.dump(pair[0]) == ast.dump(pair[1])
+def _refuse_clashes(kept: list[_Statement], others: list[str]) -> None:
+    for part in others:
+        there = {name: ast.dump(each.node) for each in _read(part) for name in each.binds}
+        for each in kept:
+            for name in each.binds & {*there}:
+                if there[name] != ast.dump(each.node):
+                    where = part.partition("\n")[0].removeprefix("# %% ")
+                    raise _Unchanged(f"“{where}” has another {name}; rename yours in the notebook")
 
-    def needed_by(self, names: Sequence[str]) -> list[str]:
-        """Return the given names and those that their code needs, in the order of the cells."""
-        needed, open_ = set[str](), [*names]
-        while open_:
-            if (name := open_.pop()) in self.code and name not in needed:
-                needed.add(name)
-                open_ += self._reads[name]
-        return [name for name in self.code if name in needed]
 
-    def missing(self) -> set[str]:
-        return set().union(*self._reads.values()) - {*self.code}
+def _with_imports(head: str, kept: list[_Statement], body: str) -> str:
+    """Return the head with the imports that the file needs, also of functions of the course."""
+    imports = [each for each in [*_read(head), *kept] if each.is_import]
+    imports = [each for each in imports if "assignments.twins" not in each.code]
+    statements = _read(body)
+    read = set().union(*(each.reads for each in statements))
+    used = {each.code: each for each in imports if each.binds & read or "*" in each.code}
+    bound = set().union(*(each.binds for each in [*statements, *used.values()]))
+    lent = sorted((read - bound) & {*twins.__all__})
+    unknown = set().union(*(each.reads for each in kept)) - bound - {*lent, *dir(builtins)}
+    if unknown and not any("*" in code for code in used):
+        raise _Unchanged(f"{min(unknown)} is not defined in an answer or an added cell")
+    text = re.split(r"^(?=from |import )", head, flags=re.MULTILINE)[0].strip()
+    return "\n".join([text, *used, *map(_LENT.format, lent)])
+
+
+def _test(text: str, problems: dict[str, dict[str, Any]]) -> None:
+    """Run the tests of the set with the functions of the new file."""
+    space: dict[str, Any] = {"__name__": "my_motion"}
+    with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()):
+        try:
+            exec(compile(text, FILE, "exec"), space)
+            for name, problem in problems.items():
+                made(problem).accepts(space[name])
+        except (Exception, SystemExit) as error:
+            raise _Unchanged(f"in the file, your code fails: {error}") from None

@@ -26,9 +26,18 @@ def problem(name: str, slug: str) -> Problem | Sampler:
     file = next((file for file in files if file.is_file()), None)
     if not file:
         raise NotYet(f"{name}.json is missing. Copy it from the handout into this folder.")
-    data = json.loads(file.read_text("utf-8"), object_hook=_as_array)[slug]
-    for key in ("read", "keep", "doc"):  # these are for the feedback page and for my_motion.py
-        data.pop(key, "")
+    return made(loaded(file.read_text("utf-8"))[slug])
+
+
+def loaded(text: str) -> dict[str, Any]:
+    """Return the data of a set from the text of its file."""
+    data: dict[str, Any] = json.loads(text, object_hook=_as_array)
+    return data
+
+
+def made(data: dict[str, Any]) -> Problem | Sampler:
+    """Return a problem from its data; `read`, `keep` and `doc` are for other modules."""
+    data = {key: value for key, value in data.items() if key not in ("read", "keep", "doc")}
     data["mistakes"] = [Mistake(**mistake) for mistake in data["mistakes"]]
     if law := data.pop("law", None):
         return Sampler(**LAWS[law], **data)

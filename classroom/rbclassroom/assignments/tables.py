@@ -8,6 +8,7 @@ that make the mistake. The right answers come from the notebook. `own` says whic
 answer may use; students see it when an answer is right, and nothing checks it.
 """
 
+import ast
 import copy
 import hashlib
 import inspect
@@ -92,7 +93,8 @@ def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> di
     if "law" not in known:
         known |= {"drawing": drawing, "names": names[drawing:], "inputs": inputs}
         known["answers"] = run(space[_name(answer)])
-    known["doc"] = space[_name(answer)].__doc__
+    defined = [node for node in ast.parse(answer).body if isinstance(node, ast.FunctionDef)]
+    known["doc"] = ast.get_docstring(defined[-1])
     if problem.get("keep"):
         known["keep"] = _name(answer)
     known["mistakes"] = []

@@ -12,10 +12,10 @@ import pytest
 from test_problems import SETS, SOURCE, TABLES, cells
 from test_sets_graded import regions
 
-from rbclassroom.assignments import comparison, my_motion, twins
+from rbclassroom.assignments import my_motion, twins
 from rbclassroom.assignments.check import check
 from rbclassroom.assignments.handout import build_wheel, release
-from rbclassroom.assignments.my_motion import FILE, keep, mine, only_course
+from rbclassroom.assignments.my_motion import FILE, OWN, find, keep, mine, only_course
 from rbclassroom.assignments.tables import update
 from rbcourse import acceleration_cost, exp_so3, minimum_acceleration, projected_cubic
 
@@ -24,14 +24,18 @@ ORDER = [f"ps{number}" for number in (1, 2, 3, 4, 8, 5, 6, 7, 9)]
 
 def data_of(name):
     update(SOURCE / name)
-    return json.loads((SOURCE / name / f"{name}.json").read_text("utf-8"))
+    return (SOURCE / name / f"{name}.json").read_text("utf-8")
+
+
+def kept_by(name):
+    return [each["keep"] for each in json.loads(data_of(name)).values() if "keep" in each]
 
 
 def answers(name):
     """Return the code of a student whose answers are the model answers."""
-    found = [cell.source for key, cell in cells(name).items() if key.endswith("-answer")]
-    code = [cells(name)["setup"].source, *(text for text in found if "def " in text)]
-    return [re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text) for text in code]
+    found = {key: cell.source for key, cell in cells(name).items() if cell.cell_type == "code"}
+    own = [(key, text) for key, text in found.items() if key == "setup" or key.endswith("-answer")]
+    return [(key, re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text)) for key, text in own]
 
 
 def after(text, name, passed=None):
@@ -69,8 +73,8 @@ def test_a_set_that_is_kept_again_does_not_change_the_file(whole):
 
 def test_a_late_starter_borrows_functions_until_the_own_ones_pass():
     text = after("", "ps5")
-    (line,) = (line for line in text.splitlines() if "rbclassroom" in line)
-    assert "import hat_so3, log_so3, nearest_rotation " in line
+    lent = re.findall(r"from rbclassroom.* import (\w+)  # the course's", text)
+    assert lent == ["hat_so3", "log_so3", "nearest_rotation"]
     exec(text, {})
     assert "rbclassroom" not in after(text, "ps2")
 
@@ -80,46 +84,85 @@ def test_only_accepted_functions_are_kept_and_none_is_lost():
     assert "def screw" in text
     assert "def projected_line" not in text
     unchanged, said = keep(text, "ps4", data_of("ps4"), answers("ps4"), ["screw"])
-    assert (unchanged, said) == (
-        text,
-        f"{FILE} keeps your earlier part of ps4, since geodesic fails now",
-    )
+    assert unchanged == text
+    assert said == f"{FILE} is not changed: geodesic, of your earlier ps4, fails now"
     assert keep("", "ps4", data_of("ps4"), answers("ps4"), ["theta"]) == ("", "")
 
 
 def test_code_with_another_meaning_is_not_overwritten():
     text = f"{after('', 'ps2')}\n\ndef coupling(Q):\n    return 'another meaning'\n"
-    same, said = keep(text, "ps7", data_of("ps7"), answers("ps7"), ["spline"])
-    assert (same, said) == (
-        text,
-        f"{FILE} is not changed: it has another coupling; rename yours in ps7",
-    )
-    broken = text.replace("import numpy", "import numpy as")
-    assert "its line" in keep(broken, "ps7", data_of("ps7"), answers("ps7"), ["spline"])[1]
+    for broken, said in (
+        (text, "“my own functions” has another coupling; rename yours in the notebook"),
+        (text.replace("import numpy", "import numpy as"), "it is not Python: invalid syntax"),
+        (text.replace(OWN, ""), "a set has two parts, or the line"),
+    ):
+        same, told = keep(broken, "ps7", data_of("ps7"), answers("ps7"), ["spline"])
+        assert same == broken
+        assert said in told
 
 
-def test_helpers_comments_and_imports_of_the_student_come_along():
-    cell = """%matplotlib inline
+PATH = "def geodesic(R0, R1, t):\n    return exp_so3(log_so3(R1 @ R0.T) * t) @ R0\n"
+NEEDED = {
+    "a comment, a constant, and a command of Jupyter": f"""%matplotlib inline
 from math import pi, tau
 
 # half a turn
 HALF = pi
+{PATH.replace(" * t", " * t * HALF / (tau - HALF)")}""",
+    "a changed array": "eye = np.zeros((3, 3))\nfor k in range(3):\n    eye[k, k] = 1\n"
+    + PATH.replace("@ R0\n", "@ R0 @ eye\n"),
+    "a decorator, a class and a later definition": f"""import functools
+class Turn:
+    def __init__(self, R):
+        self.R = R
+@functools.lru_cache
+def one(): return 2
+def one(): return 1
+{PATH.replace("return exp", "return one() * Turn(exp").replace("t) @", "t)).R @")}""",
+    "a star": f"from math import *\n{PATH.replace('* t', '* t * cos(0)')}",
+    "a question, and a text with a mark": f"{PATH}    '''\n# %% ps3\n'''\ngeodesic?",
+    "a wrapped function": f"{PATH}plain = geodesic\ngeodesic = lambda *ends: plain(*ends)\n",
+}
 
 
-def circle(x):
-    return scale * x
+@pytest.mark.parametrize("code", NEEDED.values(), ids=NEEDED)
+def test_the_code_that_a_function_needs_comes_along(code):
+    later = "geodesic = None\ndef one(): pass"
+    given = [answers("ps4")[0], ("", "1 +"), ("geodesic-answer", code), ("", later)]
+    text, said = keep(after("", "ps2"), "ps4", data_of("ps4"), given, ["geodesic"])
+    assert said == f"{FILE} has your geodesic"
+    assert "rbclassroom" not in text
+    assert ("# half a turn\nHALF = pi" in text) == ("HALF" in code)
+    assert "def one(): pass" not in text
 
 
-scale, unused = HALF / tau, tau
-"""
-    theirs = "def geodesic(R0, R1, t):\n    # YOUR CODE HERE\n    return circle(t)\n"
-    given = [cell, theirs, "a scratch cell with an error"]
-    text, _ = keep("", "ps4", data_of("ps4"), given, ["geodesic"])
-    assert "# half a turn\nHALF = pi\n" in text
-    assert "YOUR CODE" not in text
-    space = {}
-    exec(text, space)
-    assert space["geodesic"](0, 0, 4) == 2
+@pytest.mark.parametrize(
+    ("code", "why"),
+    [
+        (PATH.replace("* t", "* t * unknown"), "unknown is not defined"),
+        (PATH.replace("exp_so3", "mine('exp_so3')"), "mine is not defined"),
+        (PATH.replace("return", "1 / 0\n    return"), "your code fails: Your function stops"),
+    ],
+)
+def test_code_that_fails_in_the_file_is_refused(code, why):
+    text = after("", "ps2")
+    given = [answers("ps4")[0], ("geodesic-answer", code)]
+    same, said = keep(text, "ps4", data_of("ps4"), given, ["geodesic"])
+    assert same == text
+    assert why in said
+
+
+@pytest.mark.parametrize("name", ["UNI\\nora", 'a"""b', ""])
+def test_each_name_of_an_account_is_possible(name, monkeypatch):
+    def account():
+        if name:
+            return name
+        raise KeyError("getpwuid(): uid not found")
+
+    monkeypatch.setattr(my_motion.getpass, "getuser", account)
+    text, said = keep("", "ps2", data_of("ps2"), answers("ps2"), ["hat"])
+    assert said == f"{FILE} has your hat_so3"
+    compile(text, FILE, "exec")
 
 
 @pytest.fixture
@@ -177,10 +220,19 @@ def test_the_check_writes_the_file_and_the_next_set_uses_it(tmp_path, capsys):
     assert f"exp_so3, log_so3, nearest_rotation: your own, from {FILE}" in str(outputs)
 
 
+def test_the_file_is_found_beside_the_folders_of_the_sets(tmp_path):
+    nested = tmp_path / "ps2 (1)" / "ps2"
+    nested.mkdir(parents=True)
+    assert find(nested, "ps2") == tmp_path / FILE
+    assert find(tmp_path, "ps2") == tmp_path / FILE
+    (tmp_path / FILE).touch()
+    assert find(nested, "ps2") == find(tmp_path / "ps4", "ps4") == tmp_path / FILE
+
+
 @pytest.mark.parametrize("name", SETS)
 def test_each_set_keeps_functions_and_ends_with_a_comparison(name, capsys):
     space = {}
-    for text in answers(name):
+    for _, text in answers(name):
         exec(text, space)
     capsys.readouterr()
     exec(cells(name)["compare-table"].source, space)
@@ -188,13 +240,9 @@ def test_each_set_keeps_functions_and_ends_with_a_comparison(name, capsys):
     assert len(lines) >= 4
     assert not re.search("fails|written", "\n".join(lines))
     assert cells(name)["compare"].source.count("?") == 1
-    empty = cells(name)["compare-table"].source.partition('"')[2].partition('"')[0]
-    comparison.compare(empty, lambda *_: 1 / 0)
-    assert "fails" in capsys.readouterr().out
     title = cells(name)["title"].source
-    kept = [each["keep"] for each in data_of(name).values() if "keep" in each]
-    assert kept
-    for function in kept:
+    assert kept_by(name)
+    for function in kept_by(name):
         assert f"`{function}`" in title
 
 
@@ -203,8 +251,7 @@ def test_the_page_for_teachers_has_the_thread():
     rows = dict(re.findall(r"^\| (ps\d) \| (`.*?`) \|", page, re.MULTILINE))
     assert [*rows] == ORDER
     for name, functions in rows.items():
-        kept = [each["keep"] for each in data_of(name).values() if "keep" in each]
-        assert sorted(re.findall(r"`(\w+)`", functions)) == sorted(kept)
+        assert sorted(re.findall(r"`(\w+)`", functions)) == sorted(kept_by(name))
 
 
 def test_no_handout_reveals_an_answer():
