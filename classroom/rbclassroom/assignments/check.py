@@ -155,7 +155,7 @@ def _error(cell: NotebookNode) -> str:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
     hint = lines[-1] and errors[-1].ename == "NotYet"  # show a hint without the name of its error
-    return lines[-1][:200] if hint else f"{errors[-1].ename}: {lines[-1][:200]}".rstrip(": ")
+    return lines[-1][:400] if hint else f"{errors[-1].ename}: {lines[-1][:400]}".rstrip(": ")
 
 
 def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:

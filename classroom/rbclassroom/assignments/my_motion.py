@@ -211,6 +211,8 @@ def _split(text: str) -> tuple[str, dict[str, str], str]:
         raise _Unchanged(f"it is not Python: {error}") from None
     theirs, mark, own = text.partition(OWN)
     head, *parts = re.split(_PART, theirs, flags=re.MULTILINE)
+    if any(not each.is_import for each in _read(head)[1:]):
+        raise _Unchanged(f"move your own code below the line “{OWN}”")
     found = {part.split()[2]: part.strip() for part in parts}
     if not mark or len(found) < len(parts):
         raise _Unchanged(f"a set has two parts, or the line “{OWN}” is missing")
