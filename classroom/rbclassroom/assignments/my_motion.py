@@ -99,15 +99,16 @@ def _load() -> tuple[dict[str, Any], str]:
 
 
 def _agree(function: Any, twin: Callable[..., Any]) -> bool:
-    """Compare two functions for five arguments; the first vectors are 0, and rotations are I."""
+    """Compare two functions for vectors of five sizes, and for rotations by these vectors."""
     rng, names = np.random.default_rng(1), inspect.signature(twin).parameters
     with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()):
-        for size in range(5):
+        for size in (0, 1e-8, 0.5, 1, 2):
             given = [_argument(name, size, rng) for name in names]
             right = twin(*given)
             try:
                 got = np.asarray(function(*copy.deepcopy(given)))
-                if got.shape != right.shape or not np.allclose(got, right, rtol=0, atol=1e-7):
+                far = np.abs(got - right).max() > 1e-6 * np.abs(right).max() + 1e-12
+                if got.shape != right.shape or far or not np.isfinite(got).all():
                     return False
             except Exception:
                 return False
@@ -206,7 +207,7 @@ def _account() -> str:
 def _split(text: str) -> tuple[str, dict[str, str], str]:
     """Return the head of the file, the parts of the sets, and the student's own text."""
     try:
-        ast.parse(text)
+        ast.parse(text, FILE)
     except (SyntaxError, ValueError) as error:
         raise _Unchanged(f"it is not Python: {error}") from None
     theirs, mark, own = text.partition(OWN)
@@ -270,7 +271,7 @@ def _refuse_clashes(kept: list[_Statement], others: list[str]) -> None:
             for name in each.binds & {*there}:
                 if there[name] != ast.dump(each.node):
                     where = part.partition("\n")[0].removeprefix("# %% ")
-                    raise _Unchanged(f"“{where}” has another {name}; rename yours in the notebook")
+                    raise _Unchanged(f"“{where}” has another {name}; rename one of them")
 
 
 def _with_imports(head: str, kept: list[_Statement], body: str) -> str:
@@ -298,4 +299,4 @@ def _test(text: str, problems: dict[str, dict[str, Any]]) -> None:
             for name, problem in problems.items():
                 made(problem).accepts(space[name])
         except (Exception, SystemExit) as error:
-            raise _Unchanged(f"in the file, your code fails: {error}") from None
+            raise _Unchanged(f"with the rest of the file, your code fails: {error}") from None

@@ -94,7 +94,7 @@ def test_only_accepted_functions_are_kept_and_none_is_lost():
 def test_code_with_another_meaning_is_not_overwritten():
     text = f"{after('', 'ps2')}\n\ndef coupling(Q):\n    return 'another meaning'\n"
     for broken, said in (
-        (text, "“my own functions” has another coupling; rename yours in the notebook"),
+        (text, "“my own functions” has another coupling; rename one of them"),
         (text.replace("import numpy", "import numpy as"), "it is not Python: invalid syntax"),
         (text.replace(OWN, ""), "a set has two parts, or the line"),
     ):
@@ -194,6 +194,11 @@ def test_a_later_set_uses_right_functions_and_replaces_others(folder, capsys):
     ]
     with only_course():
         assert mine("vee_so3") is twins.vee_so3
+    flat = "a = np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))"  # 0 for an angle of 1e-9
+    inexact = f"def log_so3(R):\n    {flat}\n    return a * vee_so3(R) / max(np.sin(a), 1e-99)\n"
+    (folder / FILE).write_text(f"import numpy as np\n{right}\n{inexact}", "utf-8")
+    assert mine("log_so3") is twins.log_so3
+    assert "yours give other results" in capsys.readouterr().out
     (folder / FILE).write_text("1 / 0", "utf-8")
     assert mine("vee_so3") is twins.vee_so3
     assert f"{FILE} stops: ZeroDivisionError" in capsys.readouterr().out
@@ -215,7 +220,9 @@ def test_the_check_writes_the_file_and_the_next_set_uses_it(tmp_path, capsys):
                 text = cells(name)[cell.metadata.nbgrader.grade_id].source
                 cell.source = re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text)
         nbformat.write(notebook, tmp_path / name / f"{name}.ipynb")
+        before = (tmp_path / FILE).read_text("utf-8") if (tmp_path / FILE).exists() else ""
         submitted = check(tmp_path / name / f"{name}.ipynb")
+        assert (tmp_path / FILE).with_suffix(".before.py").read_text("utf-8") == before
         assert f"{FILE} has your" in capsys.readouterr().out
     assert "def screw" in (tmp_path / FILE).read_text("utf-8")
     outputs = [cell.get("outputs") for cell in nbformat.read(submitted, 4).cells]
