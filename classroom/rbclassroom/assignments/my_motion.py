@@ -107,7 +107,7 @@ def _agree(function: Any, twin: Callable[..., Any]) -> bool:
             right = twin(*given)
             try:
                 got = np.asarray(function(*copy.deepcopy(given)))
-                far = np.abs(got - right).max() > 1e-6 * np.abs(right).max() + 1e-12
+                far = np.abs(got - right).max() > 1e-9 * np.abs(right).max() + 1e-12
                 if got.shape != right.shape or far or not np.isfinite(got).all():
                     return False
             except Exception:

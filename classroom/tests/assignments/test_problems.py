@@ -187,7 +187,7 @@ def test_the_points_of_the_problems_add_up(name):
     announced, given = {}, {}
     for cell in SETS[name].cells:
         points = cell.metadata.nbgrader.get("points", 0)
-        if heading := re.match(r"## Problem (\d) · .* \((\d+) points\)", cell.source):
+        if heading := re.match(r"## Problem (\d) · .* \((\d+) points?\)", cell.source):
             problem = int(heading[1])
             announced[problem] = int(heading[2])
         if cell.metadata.nbgrader.grade:
@@ -238,10 +238,10 @@ def test_the_example_on_the_page_for_teachers_runs(tmp_path, monkeypatch):
     given = [new_code_cell(text) for text in names.values()]
     for cell, name in zip(given, names, strict=True):
         cell.metadata.nbgrader = {"grade_id": name}
-    folder = tmp_path / "ps9"
+    folder = tmp_path / "ps10"
     folder.mkdir()
-    (tmp_path / "ps9.toml").write_text(table, "utf-8")
-    nbformat.write(new_notebook(cells=given), folder / "ps9.ipynb")
+    (tmp_path / "ps10.toml").write_text(table, "utf-8")
+    nbformat.write(new_notebook(cells=given), folder / "ps10.ipynb")
     monkeypatch.chdir(folder)
     start = f"import numpy as np\n{start}"
     exec(f"{start}{right}\n{test}", {"__name__": "__main__"})
