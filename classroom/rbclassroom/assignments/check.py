@@ -50,7 +50,7 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
         Path(own, "work").mkdir()
         for file, content in files.items():
             write_whole(Path(own, "work", file), content)
-        if (mine := find(path.parent)).is_file():
+        if (mine := find(path.parent, Path(name).stem)).is_file():
             write_whole(Path(own, FILE), mine.read_bytes())
         remarks += _run(notebook, Path(own), seconds)
     print("".join(f"- {what}\n" for what in remarks), end="")

@@ -74,16 +74,14 @@ def mine(*names: str) -> Any:
 
 
 def find(folder: Path, name: str = "") -> Path:
-    """Return the path of the student's file for the folder of a set.
+    """Return the path of the student's file for the folder of a set, with the name of the set.
 
-    It is in this folder, or in a folder above. If there is none, it will be beside the folder.
+    The file is in this folder or, usually, beside it. Some programs unpack ps1 to ps1/ps1.
     """
-    for place in (folder, *folder.parents[:2]):
-        if (place / FILE).is_file():
-            return place / FILE
-    while name and folder.name.startswith(name):  # some programs unpack ps1 to ps1/ps1
-        folder = folder.parent
-    return folder / FILE
+    place = folder
+    while place.name.startswith(name or folder.name) and place.name:
+        place = place.parent
+    return folder / FILE if (folder / FILE).is_file() else place / FILE
 
 
 def _load() -> tuple[dict[str, Any], str]:
@@ -242,6 +240,7 @@ def _code_of(node: ast.stmt, lines: list[str], given: Sequence[str | None]) -> s
     if isinstance(node, ast.FunctionDef) and (ast.get_docstring(node) or "no text") in given:
         start, end = node.body[0].lineno, node.body[0].end_lineno or 0
         if lines[start - 1].strip().startswith('"""') and lines[end - 1].endswith('"""'):
+            end += not lines[end].strip()  # an empty line below
             kept = {number: line for number, line in kept.items() if not start <= number <= end}
     return "\n".join(line for line in kept.values() if line.strip() != "# YOUR CODE HERE")
 
@@ -271,7 +270,7 @@ def _refuse_clashes(kept: list[_Statement], others: list[str]) -> None:
             for name in each.binds & {*there}:
                 if there[name] != ast.dump(each.node):
                     where = part.partition("\n")[0].removeprefix("# %% ")
-                    raise _Unchanged(f"“{where}” has another {name}; rename one of them")
+                    raise _Unchanged(f"“{where}” has another “{name}”; rename one of them")
 
 
 def _with_imports(head: str, kept: list[_Statement], body: str) -> str:

@@ -94,7 +94,7 @@ def test_only_accepted_functions_are_kept_and_none_is_lost():
 def test_code_with_another_meaning_is_not_overwritten():
     text = f"{after('', 'ps2')}\n\ndef coupling(Q):\n    return 'another meaning'\n"
     for broken, said in (
-        (text, "“my own functions” has another coupling; rename one of them"),
+        (text, "“my own functions” has another “coupling”; rename one of them"),
         (text.replace("import numpy", "import numpy as"), "it is not Python: invalid syntax"),
         (text.replace(OWN, ""), "a set has two parts, or the line"),
     ):
@@ -235,7 +235,8 @@ def test_the_file_is_found_beside_the_folders_of_the_sets(tmp_path):
     assert find(nested, "ps2") == tmp_path / FILE
     assert find(tmp_path, "ps2") == tmp_path / FILE
     (tmp_path / FILE).touch()
-    assert find(nested, "ps2") == find(tmp_path / "ps4", "ps4") == tmp_path / FILE
+    assert find(nested, "ps2") == find(nested) == find(tmp_path / "ps4") == tmp_path / FILE
+    assert find(tmp_path / "ps4" / "other", "ps4") == tmp_path / "ps4" / "other" / FILE
 
 
 @pytest.mark.parametrize("name", SETS)
