@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from rbclassroom.assignments.needed_code import names_in
 from rbclassroom.course import notebooks
 from rbclassroom.course.agreement import BASE64
-from rbclassroom.live.cells import _names, parsed
+from rbclassroom.live.cells import parsed
 
 ROOT = Path(__file__).parents[1]
 STORED = ROOT / "figures"
@@ -79,7 +80,7 @@ def needs_of_visible_cells(notebook):
             collapsed = level if cell.metadata.get("jp-MarkdownHeadingCollapsed") else collapsed
         if cell.cell_type == "code":
             for statement in parsed(cell.source, cell.id):
-                read, bound = _names(statement)
+                read, bound = names_in(statement)
                 needed = {name for name in read - bound if hidden.get(name)}
                 yield from (f"{cell.id} needs {name}" for name in needed if not collapsed)
                 hidden |= dict.fromkeys(bound, bool(collapsed))

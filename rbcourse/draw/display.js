@@ -31,7 +31,14 @@ const rbcourseDisplay = {
     return found;
   },
 
-  // Draw a state at the resolution of the screen; `still` is a loaded image. Scenes are drawn first.
+  // Return the drawings of an artist at new points, in pixels. A name moves from its anchor to one point.
+  placed(drawings, points, anchor) {
+    const [right, down] = anchor ? points[0].map((x, k) => Math.round(x) - anchor[k]) : [];
+    const moved = (run) => (anchor ? run.map(([x, y]) => [x + right, y + down]) : points);
+    return drawings.map(({ style, runs }) => ({ style, runs: runs.map(moved) }));
+  },
+
+  // Draw a state, or its drawings, at the resolution of the screen; `still` is a loaded image. Scenes are drawn first.
   draw(canvas, still, { size: [width, height], rooms }, styles, state) {
     const zoom = (window.devicePixelRatio * (canvas.clientWidth || width)) / width;
     canvas.width = Math.round(width * zoom);
@@ -39,7 +46,7 @@ const rbcourseDisplay = {
     const ink = canvas.getContext("2d");
     ink.scale(zoom, zoom);
     ink.drawImage(still, 0, 0, width, height);
-    const all = rbcourseDisplay.decode(state, styles);
+    const all = Array.isArray(state) ? state : rbcourseDisplay.decode(state, styles);
     const drawn = rooms.flatMap((room, number) => {
       const pieces = all.filter(({ style }) => style[8] === number).map(({ style, runs }) => (
         { kind: style[9], zorder: style[10], style, places: runs[0] }));
@@ -102,8 +109,9 @@ const rbcourseDisplay = {
     Object.assign(canvas, { role: "img", ariaLabel: text, said });
   },
 
-  // Replace a still picture by a canvas with its own controls. The last control plays.
-  async revive(image, { size, rooms, background, states, known, controls, milliseconds }) {
+  // Replace a still picture by a canvas with its own controls. The last control plays. The states are recorded, or an
+  // explorer computes them; then there is one recorded state for each artist, which has the artist's styles.
+  async revive(image, { size, rooms, background, states, known, controls, milliseconds, computed, parts }) {
     if (image.dataset.read || !window.DecompressionStream) return;
     image.dataset.read = true;
     const back = Object.assign(new Image(), { src: background });
@@ -121,7 +129,20 @@ const rbcourseDisplay = {
       slider.style = "flex: 1; min-width: 0";
       row.append(label, slider, output);
       panel.append(row);
-      return { slider, values, output };
+      const exact = values.map((text) => Number(text.replace("−", "-")));
+      return { slider, values, output, exact, now: exact[first] };
+    });
+    const explorer = computed && rbcourseComputed[computed], title = image.alt.split(". ")[0];
+    const templates = drawn.map((state) => rbcourseDisplay.decode(state, styles));
+    const compute = () => {
+      const { points, said: texts } = explorer.show(rows.map(({ now }) => now));
+      const all = parts.flatMap(({ name, axes: [sx, x0, sy, y0], anchor }, i) => (
+        rbcourseDisplay.placed(templates[i], points[name].map(([x, y]) => [sx * x + x0, sy * y + y0]), anchor)));
+      return [all, [texts, "", `${title}. ${texts.map((pair) => pair.join(": ")).join("; ")}`]];
+    };
+    const put = (values) => rows.forEach((row, k) => {
+      const { exact, slider } = row, places = exact.map((x) => Math.abs(x - values[k]));
+      [row.now, slider.value] = [values[k], places.indexOf(Math.min(...places))];
     });
     const last = rows.at(-1)?.slider, button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
     last?.parentNode.prepend(button);
@@ -132,9 +153,10 @@ const rbcourseDisplay = {
         k = k * values.length + +slider.value;
         slider.ariaValueText = output.textContent = values[slider.value];
       }
-      rbcourseDisplay.draw(canvas, back, { size, rooms }, styles, drawn[k]);
-      if (said.length) table.innerHTML = rbcourseDisplay.table(...said[k]);
-      rbcourseDisplay.tell(canvas, said[k]?.[2] ?? image.alt);
+      const [state, texts] = explorer ? compute() : [drawn[k], said[k]];
+      rbcourseDisplay.draw(canvas, back, { size, rooms }, styles, state);
+      if (texts) table.innerHTML = rbcourseDisplay.table(...texts);
+      rbcourseDisplay.tell(canvas, texts?.[2] ?? image.alt);
     };
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     const step = calm ? Math.ceil(+last?.max / 5) : 1;
@@ -142,10 +164,31 @@ const rbcourseDisplay = {
     const pause = () => { clearInterval(timer); timer = null; button.textContent = "▶"; };
     button.onclick = () => {
       if (timer) return pause();
-      timer = setInterval(() => { last.value = last.value === last.max ? 0 : +last.value + step; show(); }, step * milliseconds);
+      timer = setInterval(() => {
+        last.value = last.value === last.max ? 0 : +last.value + step;
+        rows.at(-1).now = rows.at(-1).exact[last.value];
+        show();
+      }, step * milliseconds);
       button.textContent = "❚❚";
     };
-    panel.oninput = () => { pause(); show(); };
+    panel.oninput = ({ target }) => {
+      pause();
+      const k = rows.findIndex(({ slider }) => slider === target);
+      if (k >= 0) rows[k].now = rows[k].exact[target.value];
+      if (explorer?.moved) put(explorer.moved(rows.map(({ now }) => now), k));
+      show();
+    };
+    if (explorer?.point) { // a click or a drag in the picture sets the controls
+      Object.assign(canvas.style, { cursor: "crosshair", touchAction: "none" });
+      canvas.onpointerdown = canvas.onpointermove = ({ type, buttons, pointerId, clientX, clientY }) => {
+        if (!(buttons & 1)) return;
+        if (type === "pointerdown") canvas.setPointerCapture(pointerId);
+        const { left, top, width: wide } = canvas.getBoundingClientRect(), [sx, x0, sy, y0] = parts[0].axes, scale = size[0] / wide;
+        const place = [((clientX - left) * scale - x0) / sx, ((clientY - top) * scale - y0) / sy];
+        const values = explorer.point(place, rows.map(({ now }) => now));
+        if (values) [pause(), put(values), show()];
+      };
+    }
     panel.onkeydown = (event) => event.stopPropagation(); // otherwise JupyterLab handles the keys
     if (rooms.length) panel.prepend(rbcourseScene.turn(canvas, rooms, show));
     image.replaceWith(canvas);

@@ -208,6 +208,12 @@ class Player:
     texts : sequence, optional
         For each state, the texts to be shown: pairs of a name and a text, a notice, and all texts
         as one line.
+    computed, script : str, optional
+        The name of an explorer in JavaScript that computes the states, and the script that defines
+        it. Then `states` has one state for each artist.
+    parts : sequence of dict, optional
+        For each artist of such an explorer: its ``name``, the map ``axes`` from its coordinates to
+        pixels, and, if it is a text, the ``anchor`` of the recorded state, in pixels.
     """
 
     name: str
@@ -220,12 +226,15 @@ class Player:
     controls: Sequence[dict[str, Any]]
     milliseconds: int = 0
     texts: Sequence[Any] = ()
+    computed: str = ""
+    script: str = ""
+    parts: Sequence[dict[str, Any]] = ()
 
     def __repr__(self) -> str:
         return f"{self.name}: {self.alt}"
 
     def _repr_html_(self) -> str:
-        engine = ENGINE if self.display.rooms else _DISPLAY
+        engine = self.script + (ENGINE if self.display.rooms else _DISPLAY)
         data = {
             "size": self.display.size,
             "rooms": self.display.rooms,
@@ -235,6 +244,8 @@ class Player:
             "controls": self.controls,
             "milliseconds": self.milliseconds,
         }
+        if self.computed:
+            data |= {"computed": self.computed, "parts": self.parts}
         return _FIGURE.substitute(
             name=f"{self.name}_{zlib.crc32(self.alt.encode()):08x}",
             width=self.display.width,

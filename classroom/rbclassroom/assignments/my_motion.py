@@ -17,15 +17,15 @@ import json
 import re
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rbclassroom.assignments import twins
+from rbclassroom.assignments.needed_code import names_in, needed
 from rbclassroom.assignments.problems import loaded, made, start_folder
-from rbclassroom.live.cells import names_in, needed
 from rbcourse import exp_so3
 
 FILE = "my_motion.py"
@@ -37,16 +37,6 @@ By {by}. The check writes the parts of the sets. Write other functions below the
 '''
 _PART = r"^(?=# %% \S+ · \d{4}-\d\d-\d\d · )"
 _LENT = "from rbclassroom.assignments.twins import {}  # the course's"
-_only_course = False
-
-
-@contextlib.contextmanager
-def only_course() -> Iterator[None]:
-    """Let `mine` return the course's functions, without a word."""
-    global _only_course
-    before, _only_course = _only_course, True
-    yield
-    _only_course = before
 
 
 def mine(*names: str) -> Any:
@@ -55,7 +45,7 @@ def mine(*names: str) -> Any:
     They are the student's, or the course's if the student's is missing or wrong.
     """
     lent = {name: getattr(twins, name) for name in names}
-    if not _only_course:
+    if not twins.alone:
         own, fault = _load()
         there = [name for name in names if own.get(name, lent[name]) is not lent[name]]
         right = [name for name in there if _agree(own[name], lent[name])]

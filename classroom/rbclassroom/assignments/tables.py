@@ -26,8 +26,8 @@ import numpy as np
 from rbclassroom.assignments.locked_cells import grade_id
 from rbclassroom.assignments.marking import curves_of, draw
 from rbclassroom.assignments.marking_samplers import LAWS, quantiles
-from rbclassroom.assignments.my_motion import only_course
 from rbclassroom.assignments.safe_files import write_whole
+from rbclassroom.assignments.twins import only_twins
 
 DRAWS = 5000
 Function = Callable[..., Any]
@@ -61,7 +61,7 @@ def evaluate(folder: Path) -> dict[str, dict[str, Any]]:
     cells = {grade_id(cell): cell.source for cell in notebook.cells if cell.cell_type == "code"}
     answers = [text for name, text in cells.items() if name.endswith("-answer")]
     space: dict[str, Any] = {"__name__": "__main__"}
-    with only_course():
+    with only_twins():
         for text in (cells.get("setup", ""), *answers, table.pop("helpers", "")):
             exec(compile(text, folder.name, "exec"), space)
     found, own = {}, table.pop("own", "")

@@ -4,6 +4,9 @@ Later sets use them where a student's own function is missing or wrong. R, R0 an
 shape (3, 3), and t is a number.
 """
 
+import contextlib
+from collections.abc import Iterator
+
 import numpy as np
 
 import rbcourse as rb
@@ -38,3 +41,16 @@ def cubic(p0: Array, p1: Array, v0: Array, v1: Array, t: float) -> Array:
 def projected_cubic(R0: Array, R1: Array, w0: Array, w1: Array, t: float) -> Array:
     """Return the rotation of the projected cubic with the angular velocities w0 and w1."""
     return textbook.projected_cubic(R0, R1, w0, w1, np.array([t]))[0][0]
+
+
+alone = False
+"""Whether `my_motion.mine` returns only the functions of this module, without a word."""
+
+
+@contextlib.contextmanager
+def only_twins() -> Iterator[None]:
+    """Set `alone` for a while."""
+    global alone
+    before, alone = alone, True
+    yield
+    alone = before

@@ -21,6 +21,7 @@ from rbclassroom.book.places import relinked, with_keys
 from rbclassroom.book.polls import voted
 from rbclassroom.course.notebooks import lesson_paths, shown_figures
 from rbclassroom.explorers import recorded
+from rbclassroom.explorers.recorded import COMPUTED
 from rbcourse.draw.display import ENGINE
 from rbcourse.draw.save import caption
 
@@ -143,9 +144,8 @@ def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
         return name, f'<script src="{to}/{name}.js"></script>'
 
     def put_player(match: re.Match[str]) -> str:
-        engine = (
-            f"window.rbcourseDisplay ??= (() => {{\n{ENGINE}\nreturn rbcourseDisplay;\n}})();\n"
-        )
+        own = f"{COMPUTED}{ENGINE}\nreturn rbcourseDisplay;"
+        engine = f"window.rbcourseDisplay ??= (() => {{\n{own}\n}})();\n"
         write(folder / "pictures" / "display.js", engine)
         name, tag = kept(match[2])
         start = f'<script>{match[1]}rbcourseStates["{name}"]);</script>'

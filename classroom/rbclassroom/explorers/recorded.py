@@ -1,4 +1,4 @@
-"""Explorers for pages without Python, with recorded states of some controls."""
+"""Explorers for pages without Python, which a script computes, or of which states are recorded."""
 
 import hashlib
 import html
@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import numpy as np
 import pooch
+from matplotlib.text import Text
 
 import rbcourse
 from rbclassroom import explorers, figures
@@ -23,7 +25,6 @@ from rbcourse.files import replace_file
 
 _ABOUT = "This is a recording. In the lesson, with Python, you can move every control in all steps."
 MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
-    "arm": ({"theta0": range(-170, 131, 60), "theta1": range(-180, 181, 60)}, 4),
     "body": (
         {
             "about": ["z, through the covers", "the diagonal x + y + z"],
@@ -37,18 +38,22 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "flip": ({"axis": ["axis 1", "axis 2", "axis 3"]}, 1),
     "interpolation": ({"yaw1": range(-160, 141, 60), "pitch1": [-80, 0]}, 5),
     "minimum_acceleration": ({"rival": list(FORMS), "size": [0.5, 1, 1.5]}, 2),
-    "planar": ({"omega1": range(-90, 91, 45), "omega2": range(-90, 91, 45)}, 2),
     "projection": ({"e12": [fifths / 5 for fifths in range(-5, 6)]}, 1),
     "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
     "rotation": ({"alpha": range(-160, 141, 60), "gamma": range(-160, 141, 60)}, 5),
     "screw": ({"tilt": range(0, 91, 15)}, 2),
     "smoothing": ({"noise": [0.2, 1, 2, 5]}, 3),
     "spline": ({"pitch": [-60, -40, -20, 20, 60], "third": [2, 2.5, 3]}, 2),
-    "theta": ({"angle": range(10, 171, 10)}, 1),
     "timing": ({"angular_speed": [0.5, 1, 2], "acceleration": [0.5, 1, 2, 4, 6]}, 4),
 }
 """The recorded values of controls of each explorer, and the stride of the control that plays."""
-_SLOWEST_FIRST = sorted(MOVED, key=["rotation", "projection", "spline"].__contains__, reverse=True)
+COMPUTED = Path(__file__).with_name("computed.js").read_text(encoding="utf-8")
+"""The JavaScript ``rbcourseComputed`` with the explorers that pages compute."""
+SCRIPTED = ["arm", "planar", "theta"]
+"""The explorers that computed.js computes."""
+_SLOWEST_FIRST = sorted(
+    [*MOVED, *SCRIPTED], key=["rotation", "projection", "spline"].__contains__, reverse=True
+)
 
 
 def record(
@@ -99,6 +104,51 @@ def record(
     )
 
 
+def computed(explorer: Explorer, name: str) -> Player:
+    """Return an explorer as a figure that computed.js moves, in all steps of all controls."""
+    now, plays, height = explorer.values, explorer.plays, explorer.display.size[1]
+    shown = explorer.state()
+    still = explorer.draw(shown.shown, zoom=2)
+    explorer.state(**{plays: explorer.steps[len(explorer.steps) // 2]})  # nothing is empty here
+    drag = (
+        ". Drag in the picture, or move the sliders." if explorer.picture.made["clickable"] else ""
+    )
+    parts, controls = list[dict[str, Any]](), list[dict[str, Any]]()
+    for key, artist in explorer.artists.items():
+        to_pixels: Any = artist.axes.transData.transform
+        x, y = to_pixels([[0, 0], [1, 1]]).T
+        affine = [x[1] - x[0], x[0], y[0] - y[1], height - y[0]]
+        part: dict[str, Any] = {"name": key, "axes": [round(float(each), 9) for each in affine]}
+        if isinstance(artist, Text):
+            right, up = to_pixels(artist.get_position())
+            part["anchor"] = [round(right), height - round(up)]
+        parts.append(part)
+    for key, control in explorer.controls.items():
+        values = explorer.steps if key == plays else _values(control)
+        texts = control._options_labels if key == plays else [_text(value) for value in values]
+        first = int(np.argmin(np.abs(np.array(values) - now[key])))
+        controls.append({"label": control.description, "values": texts, "first": first})
+    return Player(
+        f"{name}_explorer",
+        shown.texts[-1],
+        f"<figcaption>{html.escape(explorer.name)}{drag}</figcaption>",
+        still,
+        explorer.background,
+        explorer.display,
+        [explorer.display.record([artist]) for artist in explorer.artists.values()],
+        controls,
+        explorer.play.interval,
+        computed=name,
+        script=COMPUTED,
+        parts=parts,
+    )
+
+
+def _values(slider: Any) -> list[float]:
+    count = round((slider.max - slider.min) / slider.step) + 1
+    return np.linspace(slider.min, slider.max, count).round(9).tolist()
+
+
 def _text(value: Any) -> str:
     return value if isinstance(value, str) else numbers(value, 2).rstrip("0").rstrip(".")
 
@@ -109,8 +159,11 @@ def living(name: str) -> str:
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         explorer = getattr(explorers, f"{name}_explorer")()
-        figure = record(explorer, f"{name}_explorer", *MOVED[name])._repr_html_()
-        replace_file(file, figure.encode())
+        if name in SCRIPTED:
+            figure = computed(explorer, name)
+        else:
+            figure = record(explorer, f"{name}_explorer", *MOVED[name])
+        replace_file(file, figure._repr_html_().encode())
     return file.read_text("utf-8")
 
 

@@ -15,7 +15,7 @@ from test_sets_graded import regions
 from rbclassroom.assignments import my_motion, twins
 from rbclassroom.assignments.check import check
 from rbclassroom.assignments.handout import build_wheel, release
-from rbclassroom.assignments.my_motion import FILE, OWN, find, keep, mine, only_course
+from rbclassroom.assignments.my_motion import FILE, OWN, find, keep, mine
 from rbclassroom.assignments.tables import update
 from rbcourse import acceleration_cost, exp_so3, minimum_acceleration, projected_cubic
 
@@ -192,7 +192,7 @@ def test_a_later_set_uses_right_functions_and_replaces_others(folder, capsys):
         "hat_so3, cubic: the course's, because yours give other results",
         f"log_so3: the course's, because {FILE} does not contain them yet",
     ]
-    with only_course():
+    with twins.only_twins():
         assert mine("vee_so3") is twins.vee_so3
     flat = "a = np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))"  # 0 for an angle of 1e-9
     inexact = f"def log_so3(R):\n    {flat}\n    return a * vee_so3(R) / max(np.sin(a), 1e-99)\n"

@@ -64,7 +64,7 @@ def test_a_player_shows_the_drawing(timed):
     assert timed.locator("button, img[data-read]").count() == 0
 
 
-@pytest.mark.parametrize("name", ["planar", "chain", "random", "minimum_acceleration", "cube"])
+@pytest.mark.parametrize("name", ["screw", "chain", "random", "minimum_acceleration", "cube"])
 def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
     timed.set_viewport_size({"width": 1400, "height": 1000})
     show(timed, name)
@@ -130,8 +130,8 @@ def test_players_show_few_steps_if_the_user_asks_for_less_motion(timed):
 def test_a_page_without_scripts_shows_a_still_picture(context):
     plain = context.browser.new_context(java_script_enabled=False)
     page = plain.new_page()
-    show(page, "theta")
-    alt = html.unescape(re.search(r'alt="([^"]*)"', recorded.living("theta"))[1])
+    show(page, "screw")
+    alt = html.unescape(re.search(r'alt="([^"]*)"', recorded.living("screw"))[1])
     assert page.get_by_role("img", name=alt, exact=True).is_visible()
     page.get_by_text("About this picture").click()
     assert page.get_by_text("with Python, you can move every control").is_visible()

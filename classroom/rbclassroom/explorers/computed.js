@@ -1,0 +1,119 @@
+// Explorers that pages compute without Python. Functions have the names of their twins in Python.
+// show(values) returns the points of each artist in the coordinates of its axes, and the displayed texts.
+const rbcourseComputed = (() => {
+  const { sin, cos, atan2, hypot, sqrt, max, abs, PI } = Math, radians = (x) => x * (PI / 180), degrees = (x) => x * (180 / PI);
+  const range = (n) => Array.from({ length: n }, (_, k) => k);
+  const clip = (x, low, high) => Math.min(high, max(low, x));
+
+  // Return numbers as text, separated by commas; halves are rounded to even, and zero has no minus sign.
+  const numbers = (values, digits) => values.map((x) => {
+    const scaled = x * 10 ** digits, down = Math.floor(scaled);
+    const whole = scaled - down === 0.5 ? down + (abs(down) % 2) : Math.round(scaled);
+    return (whole / 10 ** digits + 0).toFixed(digits).replace("-", "−");
+  }).join(", ");
+
+  const math = {
+    // The pose of body B in frame A, composed with the pose of C in B.
+    compose_planar: ([x, y, theta], [u, v, turn]) => (
+      [x + cos(theta) * u - sin(theta) * v, y + sin(theta) * u + cos(theta) * v, theta + turn]),
+    // The pose that a constant body velocity (vx, vy, omega) reaches from (0, 0, 0) in unit time.
+    exp_planar: ([vx, vy, omega]) => {
+      const half = omega / 2, share = half ? sin(half) / half : 1;
+      return [share * (cos(half) * vx - sin(half) * vy), share * (sin(half) * vx + cos(half) * vy), omega];
+    },
+    // The joints of an arm: base, elbow and tip.
+    arm_forward_kinematics: ([q0, q1], [a, b]) => {
+      const elbow = [a * cos(q0), a * sin(q0)];
+      return [[0, 0], elbow, [elbow[0] + b * cos(q0 + q1), elbow[1] + b * sin(q0 + q1)]];
+    },
+    // Both pairs of angles for a tip, the first with the elbow at a positive angle; null out of reach.
+    arm_inverse_kinematics: ([x, y], [a, b]) => {
+      const r = hypot(x, y), slack = 9e-16 * (a + b);
+      if (r > a + b + slack || r < abs(a - b) - slack) return null;
+      const half = atan2(sqrt(max(0, (a + b - r) * (a + b + r))), sqrt(max(0, (r - abs(a - b)) * (r + abs(a - b)))));
+      return [2 * half, -2 * half].map((elbow) => {
+        const shoulder = atan2(y, x) - atan2(b * sin(elbow), a + b * cos(elbow));
+        return [shoulder - 2 * PI * Math.round(shoulder / (2 * PI)), elbow];
+      });
+    },
+    // The position of the projected line on the geodesic, its rate, and the singular value of the line.
+    theta: (t, a) => 0.5 + Math.atan((2 * t - 1) * Math.tan(a / 2)) / a,
+    singular_value: (t, a) => hypot(cos(a / 2), (2 * t - 1) * sin(a / 2)),
+    theta_rate: (t, a) => sin(a) / a / math.singular_value(t, a) ** 2,
+  };
+
+  const links = [2, 1.5], start = [-20, 110].map(radians);
+  const beside = ([x, y], dx, dy) => [x + 0.5 * dx, y + 0.3 * dy];
+  const arm = {
+    show([theta0, theta1, t]) {
+      const joints = (share) => math.arm_forward_kinematics(start.map((x, k) => x + share * (radians([theta0, theta1][k]) - x)), links);
+      const now = joints(t), [, elbow, end] = joints(1), q = start.map((x, k) => x + t * (radians([theta0, theta1][k]) - x));
+      return {
+        points: {
+          way: range(61).map((k) => joints((t * k) / 60)[2]),
+          goal: [end],
+          "goal name": [beside(end, end[1] - elbow[1], elbow[0] - end[0])],
+          links: now,
+          "hand name": [beside(now[2], now[2][0] - now[1][0], now[2][1] - now[1][1])],
+        },
+        said: [["angles", `(${numbers(q.map(degrees), 1)})°`], ["hand", `(${numbers(now[2], 2)}) m`]],
+      };
+    },
+    // A goal moves the arm to it. A click or a drag sets the goal; the elbow stays on its side.
+    moved: (values, k) => (k < 2 ? [values[0], values[1], 1] : values),
+    point(place, [, theta1]) {
+      const found = math.arm_inverse_kinematics(place, links);
+      return found && [...found[theta1 >= 0 ? 0 : 1].map(degrees), 1];
+    },
+  };
+
+  const outline = [[-2, -1], [2, -1], [2, 1], [-2, 1], [-2, -1]], nose = [[0.8, -1], [2, 0], [0.8, 1]], length = 1.3, steps = 80;
+  const planar = {
+    show(values) {
+      const commands = [0, 3].map((k) => [values[k], values[k + 1], radians(values[k + 2])]), h = 4 / steps, now = Math.round((values[6] / 4) * steps);
+      const points = {}, said = [], places = [];
+      for (const frame of ["world", "body"]) {
+        const path = [[0, 0, 0]];
+        for (const k of range(steps)) {
+          const move = commands[k < steps / 2 ? 0 : 1].map((v) => h * v), pose = path[k];
+          path.push(frame === "world" ? pose.map((x, i) => x + move[i]) : math.compose_planar(pose, math.exp_planar(move)));
+        }
+        const place = (part) => part.map(([x, y]) => math.compose_planar(path[now], [(length * x) / 4, (length * y) / 4, 0]).slice(0, 2));
+        points[`${frame} plan`] = path.map((pose) => pose.slice(0, 2));
+        points[`${frame} way`] = points[`${frame} plan`].slice(0, now + 1);
+        Object.assign(points, { [`${frame} outline`]: place(outline), [`${frame} nose`]: place(nose) });
+        said.push([frame, `(${numbers(path[now].slice(0, 2), 2)}) m, heading ${numbers([degrees(path[now][2])], 0)}°`]);
+        places.push(path[now]);
+      }
+      const up = places[0][1] - places[1][1] > -1e-9 ? 1.2 : -1.2; // the higher body's name is above
+      ["world", "body"].forEach((frame, k) => {
+        const [x, y] = places[k];
+        points[`${frame} name`] = [[clip(x, -6.5, 6.5), clip(y + (k ? -up : up), -4.5, 4.5)]];
+      });
+      return { points, said };
+    },
+  };
+
+  const theta = {
+    show([angle, t]) {
+      const a = radians(angle), on = (share) => [cos(PI / 2 + a / 2 - a * share), sin(PI / 2 + a / 2 - a * share)];
+      const now = math.theta(t, a), [first, last] = [on(0), on(1)], times = range(101).map((k) => k / 100);
+      return {
+        points: {
+          arc: times.map(on),
+          chord: [first, last],
+          ray: [[0, 0], on(now)],
+          even: [on(t)],
+          line: [first.map((x, k) => x + t * (last[k] - x))],
+          "line name": [[last[0] + 0.06, last[1] - 0.04]],
+          shadow: [on(now)],
+          theta: times.map((time) => [time, math.theta(time, a)]),
+          "theta now": [[t, now]],
+        },
+        said: [["θ(t)", now], ["dθ/dt", math.theta_rate(t, a)], ["s(t), of the line", math.singular_value(t, a)]].map(
+          ([name, value]) => [name, value.toFixed(3)]),
+      };
+    },
+  };
+  return { math, arm, planar, theta };
+})();
