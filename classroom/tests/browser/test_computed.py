@@ -73,7 +73,7 @@ def values_of(explorer):
 @pytest.mark.parametrize("name", NAMES)
 def test_each_state_agrees_with_that_of_python(page, name):
     explorer = getattr(explorers, f"{name}_explorer")()
-    explorer._resting = True  # nobody looks at the widgets
+    explorer._resting = True  # the widgets are not shown
     trials = list(values_of(explorer))
     call = f"(all) => all.map((values) => rbcourseComputed.{name}.show(values))"
     found = page.evaluate(call, [list(values.values()) for values in trials])
