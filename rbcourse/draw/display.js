@@ -136,8 +136,11 @@ const rbcourseDisplay = {
     const templates = drawn.map((state) => rbcourseDisplay.decode(state, styles));
     const compute = () => {
       const { points, said: texts } = explorer.show(rows.map(({ now }) => now));
-      const all = parts.flatMap(({ name, axes: [sx, x0, sy, y0], anchor }, i) => (
-        rbcourseDisplay.placed(templates[i], points[name].map(([x, y]) => [sx * x + x0, sy * y + y0]), anchor)));
+      const all = parts.flatMap(({ name, axes, anchor }, i) => {
+        if (!name) return templates[i]; // these artists do not move
+        const pixels = points[name].map((point) => point.map((x, k) => axes[2 * k] * x + axes[2 * k + 1]));
+        return rbcourseDisplay.placed(templates[i], pixels, anchor);
+      });
       return [all, [texts, "", `${title}. ${texts.map((pair) => pair.join(": ")).join("; ")}`]];
     };
     const put = (values) => rows.forEach((row, k) => {
@@ -183,7 +186,7 @@ const rbcourseDisplay = {
       canvas.onpointerdown = canvas.onpointermove = ({ type, buttons, pointerId, clientX, clientY }) => {
         if (!(buttons & 1)) return;
         if (type === "pointerdown") canvas.setPointerCapture(pointerId);
-        const { left, top, width: wide } = canvas.getBoundingClientRect(), [sx, x0, sy, y0] = parts[0].axes, scale = size[0] / wide;
+        const { left, top, width: wide } = canvas.getBoundingClientRect(), [sx, x0, sy, y0] = parts.at(-1).axes, scale = size[0] / wide;
         const place = [((clientX - left) * scale - x0) / sx, ((clientY - top) * scale - y0) / sy];
         const values = explorer.point(place, rows.map(({ now }) => now));
         if (values) [pause(), put(values), show()];

@@ -40,6 +40,50 @@ const rbcourseComputed = (() => {
     theta: (t, a) => 0.5 + Math.atan((2 * t - 1) * Math.tan(a / 2)) / a,
     singular_value: (t, a) => hypot(cos(a / 2), (2 * t - 1) * sin(a / 2)),
     theta_rate: (t, a) => sin(a) / a / math.singular_value(t, a) ** 2,
+    matmul: (A, B) => A.map((row) => B[0].map((_, j) => row.reduce((sum, x, k) => sum + x * B[k][j], 0))),
+    transpose: (A) => A[0].map((_, j) => A.map((row) => row[j])),
+    // The eigenvalues of a symmetric matrix and, as columns, its eigenvectors, by Jacobi's rotations.
+    eigh(S) {
+      let V = S.map((row, i) => row.map((_, j) => +(i === j)));
+      for (let sweep = 0; sweep < 12; sweep++) for (let p = 0; p < S.length; p++) for (let q = p + 1; q < S.length; q++) {
+        const a = 0.5 * atan2(2 * S[p][q], S[q][q] - S[p][p]), J = S.map((row, i) => row.map((_, j) => +(i === j)));
+        Object.assign(J[p], { [p]: cos(a), [q]: sin(a) });
+        Object.assign(J[q], { [p]: -sin(a), [q]: cos(a) });
+        [S, V] = [math.matmul(math.transpose(J), math.matmul(S, J)), math.matmul(V, J)];
+      }
+      return [S.map((row, i) => row[i]), V];
+    },
+    matrix_from_quaternion: ([w, x, y, z]) => [
+      [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+      [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+      [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]],
+    // The nearest rotation: its quaternion is the eigenvector of the largest eigenvalue of a 4 × 4 matrix.
+    project_so(M) {
+      const [[a, b, c], [d, e, f], [g, h, i]] = M;
+      const [values, vectors] = math.eigh([[a + e + i, h - f, c - g, d - b], [h - f, a - e - i, b + d, c + g],
+        [c - g, b + d, e - a - i, f + h], [d - b, c + g, f + h, i - a - e]]);
+      const most = values.indexOf(Math.max(...values));
+      return math.matrix_from_quaternion(vectors.map((row) => row[most]));
+    },
+    // Gram and Schmidt's columns, or null if the columns depend on each other.
+    orthonormalize_gram_schmidt(M) {
+      const columns = [];
+      for (let q of math.transpose(M)) {
+        const size = hypot(...q);
+        for (const p of [...columns, ...columns]) {
+          const along = q.reduce((sum, x, k) => sum + x * p[k], 0);
+          q = q.map((x, k) => x - along * p[k]);
+        }
+        if (hypot(...q) <= 2.7e-15 * size) return null;
+        columns.push(q.map((x) => x / hypot(...q)));
+      }
+      return math.transpose(columns);
+    },
+    det: ([[a, b, c], [d, e, f], [g, h, i]]) => a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g),
+    angle_between(R, S) {
+      const [[a, b, c], [d, e, f], [g, h, i]] = math.matmul(math.transpose(R), S);
+      return atan2(hypot(h - f, c - g, d - b) / 2, (a + e + i - 1) / 2);
+    },
   };
 
   const links = [2, 1.5], start = [-20, 110].map(radians);
@@ -115,5 +159,29 @@ const rbcourseComputed = (() => {
       };
     },
   };
-  return { math, arm, planar, theta };
+  const projection = {
+    show([e12, e23, e33, pull]) {
+      const M = [[1, pull * e12, 0], [0, 1, pull * e23], [0, 0, 1 + pull * e33]];
+      const R = math.project_so(M), G = math.orthonormalize_gram_schmidt(M), det = math.det(M), points = {};
+      const flat = [[0, 0, 0], [0, 0, 0], [0, 0, 0]], fate = !G ? "none: M is flat" : math.det(G) > 0 ? "" : "a mirror";
+      for (const [name, matrix] of [["M", M], ["nearest", R], ["Gram–Schmidt", G ?? flat]]) {
+        math.transpose(matrix).forEach((column, k) => {
+          points[`${name} ${"xyz"[k]}`] = [[0, 0, 0], column];
+          points[`${name} ${"xyz"[k]} letter`] = [column.map((x) => 1.2 * x)];
+        });
+      }
+      const singular = math.eigh(math.matmul(math.transpose(R), M))[0].map(abs).sort((a, b) => b - a);
+      const far = (S) => hypot(...M.flatMap((row, i) => row.map((x, j) => x - S[i][j])));
+      const said = [
+        ["determinant", numbers([det], 2)],
+        ["singular values", numbers(singular, 2)],
+        ["M to nearest", numbers([far(R)], 3)],
+        ["M to Gram–Schmidt", fate || numbers([far(G)], 3)],
+        ["angle between", fate ? "none" : `${numbers([degrees(math.angle_between(R, G))], 1)}°`],
+      ];
+      if (singular[1] + Math.sign(det) * singular[2] < 1e-9) said.push(["nearest?", "several are equally near"]);
+      return { points, said };
+    },
+  };
+  return { math, arm, planar, theta, projection };
 })();

@@ -21,6 +21,7 @@ from rbclassroom.explorers.explorer import Explorer, numbers
 from rbclassroom.explorers.paths import JOINED
 from rbclassroom.figures import FORMS
 from rbcourse.draw.display import Player
+from rbcourse.draw.space import IN_SPACE, scenes
 from rbcourse.files import replace_file
 
 _ABOUT = "This is a recording. In the lesson, with Python, you can move every control in all steps."
@@ -38,7 +39,6 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "flip": ({"axis": ["axis 1", "axis 2", "axis 3"]}, 1),
     "interpolation": ({"yaw1": range(-160, 141, 60), "pitch1": [-80, 0]}, 5),
     "minimum_acceleration": ({"rival": list(FORMS), "size": [0.5, 1, 1.5]}, 2),
-    "projection": ({"e12": [fifths / 5 for fifths in range(-5, 6)]}, 1),
     "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
     "rotation": ({"alpha": range(-160, 141, 60), "gamma": range(-160, 141, 60)}, 5),
     "screw": ({"tilt": range(0, 91, 15)}, 2),
@@ -49,7 +49,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
 """The recorded values of controls of each explorer, and the stride of the control that plays."""
 COMPUTED = Path(__file__).with_name("computed.js").read_text(encoding="utf-8")
 """The JavaScript ``rbcourseComputed`` with the explorers that pages compute."""
-SCRIPTED = ["arm", "planar", "theta"]
+SCRIPTED = ["arm", "planar", "projection", "theta"]
 """The explorers that computed.js computes."""
 _SLOWEST_FIRST = sorted(
     [*MOVED, *SCRIPTED], key=["rotation", "projection", "spline"].__contains__, reverse=True
@@ -113,16 +113,18 @@ def computed(explorer: Explorer, name: str) -> Player:
     drag = (
         ". Drag in the picture, or move the sliders." if explorer.picture.made["clickable"] else ""
     )
-    parts, controls = list[dict[str, Any]](), list[dict[str, Any]]()
-    for key, artist in explorer.artists.items():
-        to_pixels: Any = artist.axes.transData.transform
-        x, y = to_pixels([[0, 0], [1, 1]]).T
-        affine = [x[1] - x[0], x[0], y[0] - y[1], height - y[0]]
-        part: dict[str, Any] = {"name": key, "axes": [round(float(each), 9) for each in affine]}
-        if isinstance(artist, Text):
-            right, up = to_pixels(artist.get_position())
-            part["anchor"] = [round(right), height - round(up)]
-        parts.append(part)
+    fig = next(iter(explorer.artists.values())).figure
+    inside = [artist for scene in scenes(fig) for artist in scene.artists]
+    fixed = {"": [artist for artist in inside if artist not in explorer.artists.values()]}
+    parts, states = list[dict[str, Any]](), list[Any]()
+    for key, shown_now in {**fixed, **{k: [each] for k, each in explorer.artists.items()}}.items():
+        for each in inside:
+            each.set_visible(each in shown_now)
+        states.append(explorer.display.record(shown_now))
+        parts.append({"name": key, **(_places(shown_now[0], height) if key else {})})
+    for each in inside:
+        each.set_visible(True)
+    controls = list[dict[str, Any]]()
     for key, control in explorer.controls.items():
         values = explorer.steps if key == plays else _values(control)
         texts = control._options_labels if key == plays else [_text(value) for value in values]
@@ -135,13 +137,28 @@ def computed(explorer: Explorer, name: str) -> Player:
         still,
         explorer.background,
         explorer.display,
-        [explorer.display.record([artist]) for artist in explorer.artists.values()],
+        states,
         controls,
         explorer.play.interval,
         computed=name,
         script=COMPUTED,
         parts=parts,
     )
+
+
+def _places(artist: Any, height: int) -> dict[str, Any]:
+    """Return the map from the coordinates of an artist to pixels, and the place of a name."""
+    if isinstance(artist, IN_SPACE):
+        scale, middle = artist.axes.sight().scale, artist.axes.sight().middle
+        return {"axes": [part for x in middle for part in (scale, -scale * x)]}
+    to_pixels = artist.axes.transData.transform
+    x, y = to_pixels([[0, 0], [1, 1]]).T
+    axes = [x[1] - x[0], x[0], y[0] - y[1], height - y[0]]
+    found: dict[str, Any] = {"axes": [round(float(each), 9) for each in axes]}
+    if isinstance(artist, Text):
+        right, up = to_pixels(artist.get_position())
+        found["anchor"] = [round(right), height - round(up)]
+    return found
 
 
 def _values(slider: Any) -> list[float]:
