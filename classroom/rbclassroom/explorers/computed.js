@@ -3,7 +3,6 @@
 const rbcourseComputed = (() => {
   const { sin, cos, atan2, hypot, sqrt, max, abs, PI } = Math, radians = (x) => x * (PI / 180), degrees = (x) => x * (180 / PI);
   const range = (n) => Array.from({ length: n }, (_, k) => k);
-  const clip = (x, low, high) => Math.min(high, max(low, x));
 
   // Return numbers as text, separated by commas; halves are rounded to even, and zero has no minus sign.
   const numbers = (values, digits) => values.map((x) => {
@@ -13,14 +12,6 @@ const rbcourseComputed = (() => {
   }).join(", ");
 
   const math = {
-    // The pose of body B in frame A, composed with the pose of C in B.
-    compose_planar: ([x, y, theta], [u, v, turn]) => (
-      [x + cos(theta) * u - sin(theta) * v, y + sin(theta) * u + cos(theta) * v, theta + turn]),
-    // The pose that a constant body velocity (vx, vy, omega) reaches from (0, 0, 0) in unit time.
-    exp_planar: ([vx, vy, omega]) => {
-      const half = omega / 2, share = half ? sin(half) / half : 1;
-      return [share * (cos(half) * vx - sin(half) * vy), share * (sin(half) * vx + cos(half) * vy), omega];
-    },
     // The joints of an arm: base, elbow and tip.
     arm_forward_kinematics: ([q0, q1], [a, b]) => {
       const elbow = [a * cos(q0), a * sin(q0)];
@@ -111,33 +102,6 @@ const rbcourseComputed = (() => {
     },
   };
 
-  const outline = [[-2, -1], [2, -1], [2, 1], [-2, 1], [-2, -1]], nose = [[0.8, -1], [2, 0], [0.8, 1]], length = 1.3, steps = 80;
-  const planar = {
-    show(values) {
-      const commands = [0, 3].map((k) => [values[k], values[k + 1], radians(values[k + 2])]), h = 4 / steps, now = Math.round((values[6] / 4) * steps);
-      const points = {}, said = [], places = [];
-      for (const frame of ["world", "body"]) {
-        const path = [[0, 0, 0]];
-        for (const k of range(steps)) {
-          const move = commands[k < steps / 2 ? 0 : 1].map((v) => h * v), pose = path[k];
-          path.push(frame === "world" ? pose.map((x, i) => x + move[i]) : math.compose_planar(pose, math.exp_planar(move)));
-        }
-        const place = (part) => part.map(([x, y]) => math.compose_planar(path[now], [(length * x) / 4, (length * y) / 4, 0]).slice(0, 2));
-        points[`${frame} plan`] = path.map((pose) => pose.slice(0, 2));
-        points[`${frame} way`] = points[`${frame} plan`].slice(0, now + 1);
-        Object.assign(points, { [`${frame} outline`]: place(outline), [`${frame} nose`]: place(nose) });
-        said.push([frame, `(${numbers(path[now].slice(0, 2), 2)}) m, heading ${numbers([degrees(path[now][2])], 0)}°`]);
-        places.push(path[now]);
-      }
-      const up = places[0][1] - places[1][1] > -1e-9 ? 1.2 : -1.2; // the higher body's name is above
-      ["world", "body"].forEach((frame, k) => {
-        const [x, y] = places[k];
-        points[`${frame} name`] = [[clip(x, -6.5, 6.5), clip(y + (k ? -up : up), -4.5, 4.5)]];
-      });
-      return { points, said };
-    },
-  };
-
   const theta = {
     show([angle, t]) {
       const a = radians(angle), on = (share) => [cos(PI / 2 + a / 2 - a * share), sin(PI / 2 + a / 2 - a * share)];
@@ -183,5 +147,5 @@ const rbcourseComputed = (() => {
       return { points, said };
     },
   };
-  return { math, arm, planar, theta, projection };
+  return { math, arm, theta, projection };
 })();

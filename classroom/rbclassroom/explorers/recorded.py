@@ -39,6 +39,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "flip": ({"axis": ["axis 1", "axis 2", "axis 3"]}, 1),
     "interpolation": ({"yaw1": range(-160, 141, 60), "pitch1": [-80, 0]}, 5),
     "minimum_acceleration": ({"rival": list(FORMS), "size": [0.5, 1, 1.5]}, 2),
+    "planar": ({"omega1": range(-90, 91, 45), "omega2": range(-90, 91, 45)}, 2),
     "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
     "rotation": ({"alpha": range(-160, 141, 60), "gamma": range(-160, 141, 60)}, 5),
     "screw": ({"tilt": range(0, 91, 15)}, 2),
@@ -49,7 +50,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
 """The recorded values of controls of each explorer, and the stride of the control that plays."""
 COMPUTED = Path(__file__).with_name("computed.js").read_text(encoding="utf-8")
 """The JavaScript ``rbcourseComputed`` with the explorers that pages compute."""
-SCRIPTED = ["arm", "planar", "projection", "theta"]
+SCRIPTED = ["arm", "projection", "theta"]
 """The explorers that computed.js computes."""
 _SLOWEST_FIRST = sorted(
     [*MOVED, *SCRIPTED], key=["rotation", "projection", "spline"].__contains__, reverse=True

@@ -13,7 +13,6 @@ import rbcourse as rb
 from rbclassroom import explorers
 from rbclassroom.explorers.recorded import COMPUTED, SCRIPTED, living
 from rbcourse.arm import LINKS, arm_forward_kinematics, arm_inverse_kinematics
-from rbcourse.planar import compose_planar, exp_planar
 from rbcourse.straight_line import line_singular_value, theta
 
 NAMES = SCRIPTED
@@ -38,14 +37,10 @@ def from_page(page, name, inputs):
 
 def test_functions_agree_with_those_in_python(page):
     rng = np.random.default_rng(1)
-    poses, twists = rng.normal(size=(2, 1000, 3)) * [3, 3, 2]
-    twists[0] = 0
     q = rng.uniform(-np.pi, np.pi, (1000, 2))
     tips = arm_forward_kinematics(q).joints[:, -1]
     t, a = rng.random(1000), rng.uniform(1e-3, np.pi - 1e-3, 1000)
     wanted = {
-        "compose_planar": (compose_planar(poses, twists), zip(poses, twists, strict=True)),
-        "exp_planar": (exp_planar(twists), ([each] for each in twists)),
         "arm_forward_kinematics": (arm_forward_kinematics(q).joints, ((x, LINKS) for x in q)),
         "arm_inverse_kinematics": (arm_inverse_kinematics(tips), ((x, LINKS) for x in tips)),
         "theta": (theta(t, a), zip(t, a, strict=True)),
