@@ -1,5 +1,7 @@
 // Draw the moving parts, as recorded by display.py, on top of a picture of the fixed parts.
 const rbcourseDisplay = {
+  explorers: {}, // scripts add functions that return explorers, which compute their states; see revive
+
   // Return the states in the bytes, each as an array of numbers.
   split(bytes) {
     const { buffer } = bytes.slice(), [count] = new Uint32Array(buffer, 0, 1);
@@ -29,13 +31,6 @@ const rbcourseDisplay = {
       found.push({ style, runs });
     }
     return found;
-  },
-
-  // Return the drawings of an artist at new points, in pixels. A name moves from its anchor to one point.
-  placed(drawings, points, anchor) {
-    const [right, down] = anchor ? points[0].map((x, k) => Math.round(x) - anchor[k]) : [];
-    const moved = (run) => (anchor ? run.map(([x, y]) => [x + right, y + down]) : points);
-    return drawings.map(({ style, runs }) => ({ style, runs: runs.map(moved) }));
   },
 
   // Draw a state, or its drawings, at the resolution of the screen; `still` is a loaded image. Scenes are drawn first.
@@ -109,8 +104,10 @@ const rbcourseDisplay = {
     Object.assign(canvas, { role: "img", ariaLabel: text, said });
   },
 
-  // Replace a still picture by a canvas with its own controls. The last control plays. The states are recorded, or an
-  // explorer computes them; then there is one recorded state for each artist, which has the artist's styles.
+  // Replace a still picture by a canvas with its own controls. The last control plays. The states are recorded, or the
+  // explorer `computed` gets the drawings of its artists, and returns { state, moved, point }: state(values) returns new
+  // drawings and texts; moved(values, k) returns the values after a move of control k, and point(place, values) those
+  // after a click at a place, in pixels, or null.
   async revive(image, { size, rooms, background, states, known, controls, milliseconds, computed, parts }) {
     if (image.dataset.read || !window.DecompressionStream) return;
     image.dataset.read = true;
@@ -132,17 +129,7 @@ const rbcourseDisplay = {
       const exact = values.map((text) => Number(text.replace("−", "-")));
       return { slider, values, output, exact, now: exact[first] };
     });
-    const explorer = computed && rbcourseComputed[computed], title = image.alt.split(". ")[0];
-    const templates = drawn.map((state) => rbcourseDisplay.decode(state, styles));
-    const compute = () => {
-      const { points, said: texts } = explorer.show(rows.map(({ now }) => now));
-      const all = parts.flatMap(({ name, axes, anchor }, i) => {
-        if (!name) return templates[i]; // these artists do not move
-        const pixels = points[name].map((point) => point.map((x, k) => axes[2 * k] * x + axes[2 * k + 1]));
-        return rbcourseDisplay.placed(templates[i], pixels, anchor);
-      });
-      return [all, [texts, "", `${title}. ${texts.map((pair) => pair.join(": ")).join("; ")}`]];
-    };
+    const explorer = rbcourseDisplay.explorers[computed]?.(parts, drawn.map((each) => rbcourseDisplay.decode(each, styles)));
     const put = (values) => rows.forEach((row, k) => {
       const { exact, slider } = row, places = exact.map((x) => Math.abs(x - values[k]));
       [row.now, slider.value] = [values[k], places.indexOf(Math.min(...places))];
@@ -156,7 +143,7 @@ const rbcourseDisplay = {
         k = k * values.length + +slider.value;
         slider.ariaValueText = output.textContent = values[slider.value];
       }
-      const [state, texts] = explorer ? compute() : [drawn[k], said[k]];
+      const [state, texts] = explorer ? explorer.state(rows.map(({ now }) => now)) : [drawn[k], said[k]];
       rbcourseDisplay.draw(canvas, back, { size, rooms }, styles, state);
       if (texts) table.innerHTML = rbcourseDisplay.table(...texts);
       rbcourseDisplay.tell(canvas, texts?.[2] ?? image.alt);
@@ -186,9 +173,8 @@ const rbcourseDisplay = {
       canvas.onpointerdown = canvas.onpointermove = ({ type, buttons, pointerId, clientX, clientY }) => {
         if (!(buttons & 1)) return;
         if (type === "pointerdown") canvas.setPointerCapture(pointerId);
-        const { left, top, width: wide } = canvas.getBoundingClientRect(), [sx, x0, sy, y0] = parts.at(-1).axes, scale = size[0] / wide;
-        const place = [((clientX - left) * scale - x0) / sx, ((clientY - top) * scale - y0) / sy];
-        const values = explorer.point(place, rows.map(({ now }) => now));
+        const { left, top, width: wide } = canvas.getBoundingClientRect(), scale = size[0] / wide;
+        const values = explorer.point([(clientX - left) * scale, (clientY - top) * scale], rows.map(({ now }) => now));
         if (values) [pause(), put(values), show()];
       };
     }

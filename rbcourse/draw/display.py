@@ -209,8 +209,8 @@ class Player:
         For each state, the texts to be shown: pairs of a name and a text, a notice, and all texts
         as one line.
     computed, script : str, optional
-        The name of an explorer in JavaScript that computes the states, and the script that defines
-        it. Then `states` has one state for each artist.
+        The name of an explorer in JavaScript that computes the states, and the script that adds it
+        to ``rbcourseDisplay.explorers``. Then `states` has one state for each artist.
     parts : sequence of dict, optional
         For each artist of such an explorer: its ``name``, the map ``axes`` from its coordinates to
         pixels, and, if it is a text, the ``anchor`` of the recorded state, in pixels.
@@ -234,7 +234,7 @@ class Player:
         return f"{self.name}: {self.alt}"
 
     def _repr_html_(self) -> str:
-        engine = self.script + (ENGINE if self.display.rooms else _DISPLAY)
+        engine = (ENGINE if self.display.rooms else _DISPLAY) + self.script
         data = {
             "size": self.display.size,
             "rooms": self.display.rooms,

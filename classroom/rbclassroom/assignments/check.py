@@ -100,7 +100,8 @@ def _keep(notebook: NotebookNode, name: str, data: bytes, folder: Path) -> None:
         passed = [test.removesuffix("-test") for test in tests]
         new, said = keep(text, name, data.decode(), own, passed)
         if new != text:
-            write_whole(mine.with_suffix(".before.py"), text.encode())
+            if text:
+                write_whole(mine.with_suffix(".before.py"), text.encode())
             write_whole(mine, new.encode())
     except (OSError, ValueError) as error:
         said = f"{FILE} is not changed: {error}"

@@ -210,11 +210,9 @@ def _split(text: str) -> tuple[str, dict[str, str], str]:
 
 def _read(text: str, given: Sequence[str | None] = ()) -> list[_Statement]:
     """Return the statements of a cell, without given docstrings; [] if it is not Python."""
+    # a line for Jupyter, such as %time or name?, becomes pass
     plain = re.sub(r"^([ \t]*)(?:[%!?].*|.*\?)$", r"\1pass", text, flags=re.MULTILINE)
-    for lines in (
-        text.split("\n"),
-        plain.split("\n"),
-    ):  # the second time without Jupyter's commands
+    for lines in (text.split("\n"), plain.split("\n")):
         with contextlib.suppress(SyntaxError, ValueError, RecursionError):
             nodes = ast.parse("\n".join(lines)).body
             return [_Statement(x, _code_of(x, lines, given), *names_in(x)) for x in nodes]

@@ -52,5 +52,7 @@ def only_twins() -> Iterator[None]:
     """Set `alone` for a while."""
     global alone
     before, alone = alone, True
-    yield
-    alone = before
+    try:
+        yield
+    finally:
+        alone = before

@@ -144,7 +144,7 @@ def with_script_files(shown: str, folder: Path, to: str = "pictures") -> str:
         return name, f'<script src="{to}/{name}.js"></script>'
 
     def put_player(match: re.Match[str]) -> str:
-        own = f"{COMPUTED}{ENGINE}\nreturn rbcourseDisplay;"
+        own = f"{ENGINE}{COMPUTED}\nreturn rbcourseDisplay;"
         engine = f"window.rbcourseDisplay ??= (() => {{\n{own}\n}})();\n"
         write(folder / "pictures" / "display.js", engine)
         name, tag = kept(match[2])

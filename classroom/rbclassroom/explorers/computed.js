@@ -1,6 +1,6 @@
-// Explorers that pages compute without Python. Functions have the names of their twins in Python.
+// Explorers that pages compute without Python, for display.js. Functions have the names of their twins in Python.
 // show(values) returns the points of each artist in the coordinates of its axes, and the displayed texts.
-const rbcourseComputed = (() => {
+rbcourseDisplay.computed = (() => {
   const { sin, cos, atan2, hypot, sqrt, max, abs, PI } = Math, radians = (x) => x * (PI / 180), degrees = (x) => x * (180 / PI);
   const range = (n) => Array.from({ length: n }, (_, k) => k);
 
@@ -80,6 +80,7 @@ const rbcourseComputed = (() => {
   const links = [2, 1.5], start = [-20, 110].map(radians);
   const beside = ([x, y], dx, dy) => [x + 0.5 * dx, y + 0.3 * dy];
   const arm = {
+    title: "The arm",
     show([theta0, theta1, t]) {
       const joints = (share) => math.arm_forward_kinematics(start.map((x, k) => x + share * (radians([theta0, theta1][k]) - x)), links);
       const now = joints(t), [, elbow, end] = joints(1), q = start.map((x, k) => x + t * (radians([theta0, theta1][k]) - x));
@@ -103,6 +104,7 @@ const rbcourseComputed = (() => {
   };
 
   const theta = {
+    title: "The line and its shadow",
     show([angle, t]) {
       const a = radians(angle), on = (share) => [cos(PI / 2 + a / 2 - a * share), sin(PI / 2 + a / 2 - a * share)];
       const now = math.theta(t, a), [first, last] = [on(0), on(1)], times = range(101).map((k) => k / 100);
@@ -124,6 +126,7 @@ const rbcourseComputed = (() => {
     },
   };
   const projection = {
+    title: "Two repairs",
     show([e12, e23, e33, pull]) {
       const M = [[1, pull * e12, 0], [0, 1, pull * e23], [0, 0, 1 + pull * e33]];
       const R = math.project_so(M), G = math.orthonormalize_gram_schmidt(M), det = math.det(M), points = {};
@@ -147,5 +150,26 @@ const rbcourseComputed = (() => {
       return { points, said };
     },
   };
-  return { math, arm, theta, projection };
+  // Return an explorer for display.js. A part has the map from its axes to pixels; a name moves from its anchor.
+  const placed = ({ title, show, moved, point }) => (parts, drawings) => ({
+    state(values) {
+      const { points, said } = show(values);
+      const all = parts.flatMap(({ name, axes, anchor }, i) => {
+        if (!name) return drawings[i]; // these artists do not move
+        const places = points[name].map((place) => place.map((x, k) => axes[2 * k] * x + axes[2 * k + 1]));
+        const [right, down] = anchor ? places[0].map((x, k) => Math.round(x) - anchor[k]) : [];
+        const run = (old) => (anchor ? old.map(([x, y]) => [x + right, y + down]) : places);
+        return drawings[i].map(({ style, runs }) => ({ style, runs: runs.map(run) }));
+      });
+      return [all, [said, "", `${title}. ${said.map((pair) => pair.join(": ")).join("; ")}`]];
+    },
+    moved,
+    point: point && (([x, y], values) => {
+      const [sx, x0, sy, y0] = parts.at(-1).axes;
+      return point([(x - x0) / sx, (y - y0) / sy], values);
+    }),
+  });
+  const all = { arm, theta, projection };
+  for (const [name, explorer] of Object.entries(all)) rbcourseDisplay.explorers[name] = placed(explorer);
+  return { math, ...all };
 })();

@@ -49,7 +49,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
 }
 """The recorded values of controls of each explorer, and the stride of the control that plays."""
 COMPUTED = Path(__file__).with_name("computed.js").read_text(encoding="utf-8")
-"""The JavaScript ``rbcourseComputed`` with the explorers that pages compute."""
+"""The JavaScript of the explorers that pages compute; it follows ``ENGINE``."""
 SCRIPTED = ["arm", "projection", "theta"]
 """The explorers that computed.js computes."""
 _SLOWEST_FIRST = sorted(

@@ -150,7 +150,7 @@ def write(decks: dict[str, Deck], folder: Path, ready: Callable[[str], str] = st
     for name in ("slides.css", "sketch.css", "slides.js"):
         shutil.copyfile(STATIC / name, shared / name)
     # reveal.js scales slides; with `window.pixels`, a canvas has as many pixels as on the screen
-    engine = COMPUTED + ENGINE.replace("window.devicePixelRatio", "window.pixels")
+    engine = ENGINE.replace("window.devicePixelRatio", "window.pixels") + COMPUTED
     texts = {"shared/display.js": engine.replace("lineWidth: line", "lineWidth: 1.4 * line")}
     for name, deck in decks.items():
         texts[f"{name}.html"] = ready(deck_page(deck))

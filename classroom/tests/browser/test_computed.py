@@ -13,6 +13,7 @@ import rbcourse as rb
 from rbclassroom import explorers
 from rbclassroom.explorers.recorded import COMPUTED, SCRIPTED, living
 from rbcourse.arm import LINKS, arm_forward_kinematics, arm_inverse_kinematics
+from rbcourse.draw.display import ENGINE
 from rbcourse.straight_line import line_singular_value, theta
 
 NAMES = SCRIPTED
@@ -24,12 +25,14 @@ UNIT = 1 / 8
 def page(context):
     with watched(context) as page:
         page.set_content("<!DOCTYPE html><meta charset='utf-8'>")
-        page.add_script_tag(content=COMPUTED.replace("const rbcourse", "globalThis.rbcourse"))
+        page.add_script_tag(
+            content=(ENGINE + COMPUTED).replace("const rbcourse", "globalThis.rbcourse")
+        )
         yield page
 
 
 def from_page(page, name, inputs):
-    call = f"(all) => all.map((given) => rbcourseComputed.math.{name}(...given))"
+    call = f"(all) => all.map((given) => rbcourseDisplay.computed.math.{name}(...given))"
     return np.array(
         page.evaluate(call, [[np.asarray(x).tolist() for x in each] for each in inputs])
     )
@@ -85,9 +88,10 @@ def alike(said, texts):
     """Compare texts; numbers may differ by rounding, in the last digit."""
     number = r"−?\d+\.?(\d*)"
     for one, other in zip(said, texts, strict=True):
-        if re.sub(number, "#", str(one)[1:-1]) != re.sub(number, "#", str(other)[1:-1]):
+        one, other = " ".join(one), " ".join(other)
+        if re.sub(number, "#", one) != re.sub(number, "#", other):
             return False
-        for x, y in zip(*(re.finditer(number, str(each)) for each in (one, other)), strict=True):
+        for x, y in zip(re.finditer(number, one), re.finditer(number, other), strict=True):
             far = abs(float(x[0].replace("−", "-")) - float(y[0].replace("−", "-")))
             if far > 1.01 * 10.0 ** -len(x[1]):
                 return False
@@ -99,7 +103,7 @@ def test_each_state_agrees_with_that_of_python(page, name):
     explorer = getattr(explorers, f"{name}_explorer")()
     explorer._resting = True  # the widgets are not shown
     trials = list(values_of(explorer))
-    call = f"(all) => all.map((values) => rbcourseComputed.{name}.show(values))"
+    call = f"(all) => all.map((values) => rbcourseDisplay.computed.{name}.show(values))"
     found = page.evaluate(call, [list(values.values()) for values in trials])
     for values, state in zip(trials, found, strict=True):
         texts = explorer.state(**values).texts[0]
