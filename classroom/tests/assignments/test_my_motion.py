@@ -67,10 +67,11 @@ def test_the_file_of_all_sets_draws_figure_5_with_the_costs_of_the_package(whole
 
 
 def test_a_set_that_is_kept_again_does_not_change_the_file(whole):
-    text = f"{whole}\n\ndef own():\n    return 'mine'\n"
+    earlier = re.sub(r"\d{4}-\d\d-\d\d", "2020-02-29", whole)
+    text = before = f"{earlier}\n\ndef own():\n    return 'mine'\n"
     for name in ORDER:
         text = after(text, name)
-    assert text == f"{whole}\n\ndef own():\n    return 'mine'\n"
+    assert text == before
 
 
 def test_a_late_starter_borrows_functions_until_the_own_ones_pass():
