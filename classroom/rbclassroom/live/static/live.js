@@ -167,8 +167,8 @@ addEventListener("DOMContentLoaded", () => {
   const functions = () => { try { return localStorage.getItem(place) ?? ""; } catch { return whole ?? ""; } };
   async function keep() {
     const passed = [...answers].filter(([, answer]) => !answer.isOpen()).map(([id]) => id.replace(/-answer$/, ""));
-    const named = cells.map((part) => [/tag_(?:answer|try)-([\w-]+)/.exec(part.className)?.[1], texts.get(part)]);
-    const given = { name, passed, cells: named.filter(([id]) => /setup|-answer/.test(id)) };
+    const named = cells.map((part, k) => [k ? /tag_answer-([\w-]+)/.exec(part.className)?.[1] : "setup", texts.get(part)]);
+    const given = { name, passed, cells: named.filter(([id]) => id) };
     const files = { ...(await page()).files, [file]: functions(), "answers.json": JSON.stringify(given) };
     let out = "";
     const source = "from rbclassroom.assignments.my_motion import kept\nprint(kept())";
