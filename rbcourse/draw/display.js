@@ -104,7 +104,7 @@ const rbcourseDisplay = {
     Object.assign(canvas, { role: "img", ariaLabel: text, said });
   },
 
-  // Replace a still picture by a canvas with its own controls. The last control plays. The states are recorded, or the
+  // Replace a still picture by a canvas with its own controls. One control, usually the last, plays. The states are recorded, or the
   // explorer `computed` gets the drawings of its artists, and returns { state, moved, point }: state(values) returns new
   // drawings and texts; moved(values, k) returns the values after a move of control k, and point(place, values) those
   // after a click at a place, in pixels, or null.
@@ -119,28 +119,32 @@ const rbcourseDisplay = {
     const width = `width: ${size[0]}px; max-width: 100%`;
     const canvas = make("canvas", { style: `display: block; ${width}`, role: "img", ariaLabel: image.alt });
     const panel = make("div", { style: width }), table = make("div", {});
-    const rows = controls.map(({ label, values, first }) => {
-      const row = make("div", { style: "display: flex; gap: 0.6em; margin: 0.3em 0" }), max = values.length - 1;
-      const slider = make("input", { type: "range", max, value: first, ariaLabel: label });
+    const rows = controls.map(({ label, values, first, plays }, number) => {
+      const max = values.length - 1, exact = values.map((text) => parseFloat(text.replace("−", "-")));
+      const row = make("div", { style: "display: flex; gap: 0.6em; margin: 0.3em 0" });
+      const slider = make("input", { type: "range", max, value: first, ariaLabel: label, oninput: () => move(number) });
       const output = make("output", { style: "min-width: 4em; text-align: right" });
       slider.style = "flex: 1; min-width: 0";
-      row.append(label, slider, output);
-      panel.append(row);
-      const exact = values.map((text) => Number(text.replace("−", "-")));
-      return { slider, values, output, exact, now: exact[first] };
+      const words = isNaN(exact[first]) ? values : []; // words are chosen by buttons
+      const buttons = words.map((text, k) => make("button", { textContent: text, onclick: () => move(number, k) }));
+      if (words.length) Object.assign(row, { className: "rbcourse-choice", role: "group", ariaLabel: label });
+      row.append(label, ...(words.length ? buttons : [slider, output]));
+      if (max) panel.append(row); // a control with one value is fixed
+      return { slider, values, output, buttons, plays, exact, now: exact[first] };
     });
     const explorer = rbcourseDisplay.explorers[computed]?.(parts, drawn.map((each) => rbcourseDisplay.decode(each, styles)));
     const put = (values) => rows.forEach((row, k) => {
       const { exact, slider } = row, places = exact.map((x) => Math.abs(x - values[k]));
       [row.now, slider.value] = [values[k], places.indexOf(Math.min(...places))];
     });
-    const last = rows.at(-1)?.slider, button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
-    last?.parentNode.prepend(button);
+    const player = rows.find(({ plays }) => plays) ?? rows.at(-1), last = player?.slider, button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
+    last?.parentNode?.prepend(button);
     panel.append(table);
     const show = () => {
       let k = 0;
-      for (const { slider, values, output } of rows) {
+      for (const { slider, values, output, buttons } of rows) {
         k = k * values.length + +slider.value;
+        buttons.forEach((button, i) => { button.ariaPressed = i === +slider.value; });
         slider.ariaValueText = output.textContent = values[slider.value];
       }
       const [state, texts] = explorer ? explorer.state(rows.map(({ now }) => now)) : [drawn[k], said[k]];
@@ -156,23 +160,24 @@ const rbcourseDisplay = {
       if (timer) return pause();
       timer = setInterval(() => {
         last.value = last.value === last.max ? 0 : +last.value + step;
-        rows.at(-1).now = rows.at(-1).exact[last.value];
+        player.now = player.exact[last.value];
         show();
       }, step * milliseconds);
       button.textContent = "❚❚";
     };
-    panel.oninput = ({ target }) => {
+    const move = (k, to = rows[k].slider.value) => {
       pause();
-      const k = rows.findIndex(({ slider }) => slider === target);
-      if (k >= 0) rows[k].now = rows[k].exact[target.value];
+      rows[k].slider.value = to;
+      rows[k].now = rows[k].exact[to];
       if (explorer?.moved) put(explorer.moved(rows.map(({ now }) => now), k));
       show();
     };
     if (explorer?.point) { // a click or a drag in the picture sets the controls
-      Object.assign(canvas.style, { cursor: "crosshair", touchAction: "none" });
-      canvas.onpointerdown = canvas.onpointermove = ({ type, buttons, pointerId, clientX, clientY }) => {
-        if (!(buttons & 1)) return;
+      Object.assign(canvas.style, { cursor: "crosshair", touchAction: "pan-y" }); // a finger can still scroll the page
+      canvas.onpointerdown = canvas.onpointermove = canvas.onclick = ({ type, buttons, pointerId, pointerType, clientX, clientY }) => {
+        if (type !== "click" && !(buttons & 1)) return;
         if (type === "pointerdown") canvas.setPointerCapture(pointerId);
+        if (type === "pointerdown" && pointerType === "touch") return; // perhaps the page scrolls
         const { left, top, width: wide } = canvas.getBoundingClientRect(), scale = size[0] / wide;
         const values = explorer.point([(clientX - left) * scale, (clientY - top) * scale], rows.map(({ now }) => now));
         if (values) [pause(), put(values), show()];

@@ -49,7 +49,7 @@ def body_explorer() -> Explorer:
         "about": widgets.menu("turned about", list(_AXES)),
         "turn": widgets.slider("turn (°)", 150, 5, 175, 5),
         "thickness": widgets.slider("thickness (cm)", 3, 1, 15, 1),
-        "t": widgets.stepped("time (s)", 0.0, 0.0, 1.0, 0.02),
+        "t": widgets.stepped("time (s)", 0.5, 0.0, 1.0, 0.02),
     }
 
     def show(about: str, turn: float, thickness: float, t: float) -> dict[str, str]:

@@ -2,12 +2,15 @@
 // show(values) returns the points of each artist in the coordinates of its axes, and the displayed texts.
 rbcourseDisplay.computed = (() => {
   const { sin, cos, atan2, hypot, sqrt, max, abs, PI } = Math, radians = (x) => x * (PI / 180), degrees = (x) => x * (180 / PI);
-  const range = (n) => Array.from({ length: n }, (_, k) => k);
+  const range = (n) => Array.from({ length: n }, (_, k) => k), unit = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  const dot = (p, q) => p.reduce((sum, x, k) => sum + x * q[k], 0), plus = (p, q) => p.map((x, k) => x + q[k]);
+  const scaled = (factor, p) => p.map((x) => factor * x), mean = (some) => scaled(1 / some.length, some.reduce(plus));
+  const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
 
   // Return numbers as text, separated by commas; halves are rounded to even, and zero has no minus sign.
   const numbers = (values, digits) => values.map((x) => {
-    const scaled = x * 10 ** digits, down = Math.floor(scaled);
-    const whole = scaled - down === 0.5 ? down + (abs(down) % 2) : Math.round(scaled);
+    const large = x * 10 ** digits, down = Math.floor(large);
+    const whole = large - down === 0.5 ? down + (abs(down) % 2) : Math.round(large);
     return (whole / 10 ** digits + 0).toFixed(digits).replace("-", "−");
   }).join(", ");
 
@@ -48,13 +51,38 @@ rbcourseDisplay.computed = (() => {
       [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
       [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
       [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]],
-    // The nearest rotation: its quaternion is the eigenvector of the largest eigenvalue of a 4 × 4 matrix.
-    project_so(M) {
+    // The quaternion of a rotation, or of the nearest one: the eigenvector of the largest eigenvalue of a 4 × 4 matrix.
+    quaternion_from_matrix(M) {
       const [[a, b, c], [d, e, f], [g, h, i]] = M;
       const [values, vectors] = math.eigh([[a + e + i, h - f, c - g, d - b], [h - f, a - e - i, b + d, c + g],
         [c - g, b + d, e - a - i, f + h], [d - b, c + g, f + h, i - a - e]]);
-      const most = values.indexOf(Math.max(...values));
-      return math.matrix_from_quaternion(vectors.map((row) => row[most]));
+      const q = vectors.map((row) => row[values.indexOf(Math.max(...values))]);
+      const most = Math.max(...q.map(abs)), large = q.find((x) => abs(x) > most - 1e-8); // decides for half-turns
+      return scaled(Math.sign(abs(q[0]) > 1e-15 ? q[0] : large), q);
+    },
+    project_so: (M) => math.matrix_from_quaternion(math.quaternion_from_matrix(M)),
+    log_so3(R) {
+      const [w, ...v] = math.quaternion_from_matrix(R), size = hypot(...v);
+      return scaled(size > 1e-15 ? (2 * atan2(size, w)) / size : 0, v);
+    },
+    exp_so3(w) {
+      const angle = hypot(...w);
+      return math.matrix_from_quaternion([cos(angle / 2), ...scaled(angle ? sin(angle / 2) / angle : 0, w)]);
+    },
+    matrix_from_zyx: (angles) => angles.map((angle, k) => math.exp_so3(scaled(angle, unit[2 - k]))).reduce(math.matmul),
+    // The pose in the plane after a motion with the velocities (vx, vy, vθ) in the frame of the body.
+    exp_planar([x, y, angle]) {
+      const s = angle ? sin(angle) / angle : 1, c = angle ? (1 - cos(angle)) / angle : 0;
+      return [s * x - c * y, c * x + s * y, angle];
+    },
+    compose_planar: ([x, y, angle], [u, v, more]) => [
+      x + cos(angle) * u - sin(angle) * v, y + sin(angle) * u + cos(angle) * v, angle + more],
+    // The axis of the screw from the origin to a pose, its point nearest to the origin, and its slide.
+    screw_from_pose(w, place) {
+      const angle = hypot(...w), size = angle || hypot(...place) || 1, axis = scaled(1 / size, angle ? w : place);
+      const slide = dot(axis, place), off = plus(place, scaled(-slide, axis));
+      const point = angle ? scaled(0.5, plus(off, scaled(1 / Math.tan(angle / 2), cross(axis, off)))) : [0, 0, 0];
+      return { axis, point, slide };
     },
     // Gram and Schmidt's columns, or null if the columns depend on each other.
     orthonormalize_gram_schmidt(M) {
@@ -150,18 +178,138 @@ rbcourseDisplay.computed = (() => {
       return { points, said };
     },
   };
+  const plan = {
+    title: "A plan of two commands",
+    show([...values]) {
+      const t = values.pop(), now = Math.round(20 * t), points = {}, said = [], places = [];
+      const commands = [values.slice(0, 3), values.slice(3)].map(([x, y, turn]) => [x, y, radians(turn)]);
+      const add = { world: plus, body: (pose, way) => math.compose_planar(pose, math.exp_planar(way)) };
+      for (const [frame, after] of Object.entries(add)) {
+        const half = range(41).map((k) => after([0, 0, 0], scaled(k / 20, commands[0])));
+        const path = [...half, ...range(40).map((k) => after(half[40], scaled((k + 1) / 20, commands[1])))];
+        const on = (x, y) => math.compose_planar(path[now], [1.3 * x, 1.3 * y, 0]).slice(0, 2);
+        const plane = path.map(([x, y]) => [x, y]), [x, y] = plane[now];
+        points[`${frame} plan`] = plane;
+        points[`${frame} way`] = plane.slice(0, now + 1);
+        points[`${frame} outline`] = [on(-0.5, -0.25), on(0.5, -0.25), on(0.5, 0.25), on(-0.5, 0.25), on(-0.5, -0.25)];
+        points[`${frame} nose`] = [on(0.2, -0.25), on(0.5, 0), on(0.2, 0.25)];
+        places.push([x, y]);
+        said.push([frame, `(${numbers([x, y], 2)}) m, heading ${numbers([degrees(path[now][2])], 0)}°`]);
+      }
+      const up = places[0][1] - places[1][1] > -1e-9 ? 1.2 : -1.2; // the name of the higher body is above it
+      Object.keys(add).forEach((frame, k) => {
+        const [x, y] = places[k], place = [x, y + (k ? -up : up)];
+        points[`${frame} name`] = [place.map((each, i) => max([-6.5, -4.5][i], Math.min([6.5, 4.5][i], each)))];
+      });
+      return { points, said };
+    },
+  };
+
+  // The faces of a box, and a rectangle on its upper face.
+  function box(edges, R, place) {
+    const around = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
+    const faces = range(6).map((k) => around.map(([a, b]) => {
+      const corner = [0, 0, 0];
+      [corner[k % 3], corner[(k + 1) % 3], corner[(k + 2) % 3]] = [k < 3 ? 1 : -1, a, b];
+      return corner;
+    }));
+    faces.push(faces[2].map(([x, y, z]) => [x / 2, y / 2, 1.02 * z]));
+    return faces.map((face) => face.map((p) => plus(place, R.map((row) => dot(row, p.map((x, k) => (x * edges[k]) / 2))))));
+  }
+
+  // Names stand beyond the ends of axes and, in the first view, beside the box.
+  const { right, up } = rbcourseScene.sight([-55, 20]), LEAST = 1.05;
+  function beyond(end, size) {
+    const seen = [dot(right, end), dot(up, end) + 1e-9], far = hypot(...seen), toward = scaled(1 / max(far, 1e-9), seen);
+    const out = size.map((x, k) => x / 2 / max(abs(toward[k]), 1e-9)), half = scaled(0.5, size);
+    const more = max(far + Math.min(...out), hypot(1.3, 0.8, 0.25) / 2 + dot(half, toward.map(abs))) - far;
+    return plus(end, plus(scaled(more * toward[0], right), scaled(more * toward[1], up)));
+  }
+  const orientation = {
+    title: "An orientation",
+    show([alpha, beta, gamma]) {
+      const angles = [alpha, beta, gamma].map(radians), R = math.matrix_from_zyx(angles), columns = math.transpose(R);
+      const r = math.log_so3(R), angle = hypot(...r), axis = angle ? scaled(1 / angle, r) : r;
+      const second = [-sin(angles[0]), cos(angles[0]), 0], turns = [unit[2], second, columns[0]];
+      const side = Math.sign(dot(turns.reduce(plus), axis)) || 1; // not at the ends where the other names are
+      const points = { box: box([1.3, 0.8, 0.25], R, [0, 0, 0]) };
+      const named = [["first turn", turns[0], -1, 1.3, 0.65], ["second turn", second, -1, LEAST, 0.87],
+        ["third turn", columns[0], -1, LEAST, 0.71], ["one axis for all", axis, side, 1.23, 1.03]];
+      for (const [name, along, sign, far, wide] of named) {
+        points[name] = [scaled(-sign * LEAST, along), scaled(sign * far, along)];
+        points[`${name} name`] = [beyond(scaled(sign * far, along), [wide, 0.28])];
+      }
+      columns.forEach((column, k) => {
+        points[`body ${"xyz"[k]}`] = [[0, 0, 0], column];
+        points[`body ${"xyz"[k]} letter`] = [scaled(1.2, column)];
+      });
+      const lines = R.map((row) => row.map((x) => numbers([x], 3).padStart(6, "\u2007")).join("  ")).join("\n");
+      const said = [["matrix", lines], ["quaternion", numbers(math.quaternion_from_matrix(R), 2)],
+        ["axis", angle ? numbers(axis, 2) : "any"], ["angle", `${numbers([degrees(angle)], 1)}°`]];
+      if (!angle) points["one axis for all name"] = [];
+      if (abs(beta) === 90) {
+        const both = alpha - Math.sign(beta) * gamma + 180, left = both - 360 * Math.floor(both / 360) - 180;
+        said.push(["gimbal lock", `first and third axis coincide,\nα ${beta > 0 ? "−" : "+"} γ = ${numbers([left], 0)}°`]);
+      }
+      return { points, said };
+    },
+  };
+
+  const screw = {
+    title: "Geodesic and screw",
+    show([angle, tilt, x, z, t]) {
+      const along = [sin(radians(tilt)), 0, cos(radians(tilt))], goal = [x, 0, z], edges = [0.8, 0.8, 0.8];
+      const w = scaled(radians(angle === -180 ? 180 : angle), along), { axis, point, slide } = math.screw_from_pose(w, goal);
+      const turned = (share) => math.exp_so3(scaled(share, w)), R = turned(t), steps = range(101).map((k) => (t * k) / 100);
+      const around = (share) => plus(scaled(share * slide, axis), plus(point, scaled(-1, turned(share).map((row) => dot(row, point)))));
+      const places = { geodesic: scaled(t, goal), screw: angle ? around(t) : scaled(t, goal) };
+      const points = {
+        axis: [-1.8, 1.8].map((far) => plus(point, scaled(far, axis))),
+        "axis name": [plus(point, scaled(axis[2] < 0 ? 2 : -2, axis))],
+        "geodesic way": steps.map((share) => scaled(share, goal)),
+        "screw way": steps.map((share) => (angle ? around(share) : scaled(share, goal))),
+        goal: box(edges, turned(1), goal),
+      };
+      const up = places.geodesic[2] > places.screw[2] - 1e-9 ? 0.75 : -0.75, said = [];
+      for (const [name, place] of Object.entries(places)) {
+        points[name] = box(edges, R, place);
+        points[`${name} name`] = [plus(place, [0, 0, name === "screw" ? -up : up])];
+        said.push([`turned, ${name}`, `${numbers([t * abs(angle)], 1)}°`]);
+      }
+      const gap = hypot(...plus(places.screw, scaled(-1, places.geodesic))), far = hypot(...point) > 3 ? ", not in sight" : "";
+      said.push(["origins apart", `${numbers([gap], 2)} m`],
+        ["its axis through", angle ? `(${numbers(point, 1)}) m${far}` : "none"],
+        ["slide along it", angle ? `${numbers([slide / hypot(...w)], 2)} m per rad` : "all of the way"]);
+      return { points, said };
+    },
+  };
+
+  // Return the drawing of a face. It is the lighter, the more the face is turned to the light, as in space.py.
+  function shaded({ style: [old, ...style] }, corners, colour, middle) {
+    const n = rbcourseScene.normal(corners), side = Math.sign(dot(n, plus(mean(corners), scaled(-1, middle))));
+    const light = Math.round(32 * (0.84 + 0.16 * side * dot(n, [0.48, -0.36, 0.8]))) / 32;
+    const parts = [1, 3, 5].map((k) => Math.round(light * parseInt(colour.slice(k, k + 2), 16)));
+    const fill = `#${parts.map((part) => Math.min(255, part).toString(16).padStart(2, "0")).join("")}${old.slice(7)}`;
+    return { style: [fill, ...style], runs: [corners] };
+  }
+
   // Return an explorer for display.js. A part has the map from its axes to pixels; a name moves from its anchor.
   const placed = ({ title, show, moved, point }) => (parts, drawings) => ({
     state(values) {
       const { points, said } = show(values);
-      const all = parts.flatMap(({ name, axes, anchor }, i) => {
+      const all = parts.flatMap(({ name, axes, anchor, colours }, i) => {
         if (!name) return drawings[i]; // these artists do not move
-        const places = points[name].map((place) => place.map((x, k) => axes[2 * k] * x + axes[2 * k + 1]));
-        const [right, down] = anchor ? places[0].map((x, k) => Math.round(x) - anchor[k]) : [];
+        if (!points[name].length) return [];
+        const to = (place) => place.map((x, k) => axes[2 * k] * x + axes[2 * k + 1]);
+        if (colours) {
+          const faces = points[name].map((corners) => corners.map(to)), middle = mean(faces.flat());
+          return faces.map((corners, k) => shaded(drawings[i][k], corners, colours[k], middle));
+        }
+        const places = points[name].map(to), [right, down] = anchor ? places[0].map((x, k) => Math.round(x) - anchor[k]) : [];
         const run = (old) => (anchor ? old.map(([x, y]) => [x + right, y + down]) : places);
         return drawings[i].map(({ style, runs }) => ({ style, runs: runs.map(run) }));
       });
-      return [all, [said, "", `${title}. ${said.map((pair) => pair.join(": ")).join("; ")}`]];
+      return [all, [said, "", `${title}. ${said.map((pair) => pair.join(": ").split(/\s+/).join(" ")).join("; ")}`]];
     },
     moved,
     point: point && (([x, y], values) => {
@@ -169,7 +317,7 @@ rbcourseDisplay.computed = (() => {
       return point([(x - x0) / sx, (y - y0) / sy], values);
     }),
   });
-  const all = { arm, theta, projection };
+  const all = { arm, planar: plan, projection, rotation: orientation, screw, theta };
   for (const [name, explorer] of Object.entries(all)) rbcourseDisplay.explorers[name] = placed(explorer);
   return { math, ...all };
 })();

@@ -111,7 +111,7 @@ def screw_explorer() -> Explorer:
         "tilt": widgets.slider("tilt of axis (°)", 0.0, 0.0, 90.0, 1.0),
         "x": widgets.slider("goal x (m)", 2.0, -2.0, 2.0, 0.1),
         "z": widgets.slider("goal z (m)", 0.8, -1.2, 1.2, 0.1),
-        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
+        "t": widgets.stepped("time t", 0.5, 0.0, 1.0, 0.01),
     }
 
     def show(angle: float, tilt: float, x: float, z: float, t: float) -> dict[str, str]:

@@ -4,11 +4,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_simpson
 
 import rbcourse as rb
 from rbclassroom.explorers import widgets
 from rbclassroom.explorers.explorer import Explorer, apart, new_figure, new_line, new_space, numbers
-from rbclassroom.explorers.names import new_name, put_name
 from rbclassroom.figures import FORMS
 from rbcourse.draw.bodies import draw_box, draw_ground, move_box
 from rbcourse.draw.save import COLOURS, PALE
@@ -16,6 +16,7 @@ from rbcourse.draw.save import COLOURS, PALE
 Solved = tuple[list[rb.Curve], dict[str, str]]
 
 _TIMES = np.linspace(0, 1, 61)
+_COST_TIMES = np.linspace(0, 1, 101)
 _SIGMA = np.pi / 6 * np.array([1, 2, 3])
 _SIDE = 3.5
 _LOW, _HIGH = np.array([-2.0, -2, -2]), np.array([10.0, 12, 15])
@@ -55,7 +56,7 @@ def minimum_acceleration_explorer() -> Explorer:
         "rival": widgets.menu("closed form", list(FORMS)),
         "size": widgets.slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),
         "t": widgets.slider("time t", 0.5, 0.0, 1.0, 0.01),
-        "k": widgets.stepped("k (rad/time)", 1.0, -6.0, 6.0, 0.25),
+        "k": widgets.stepped("k (rad/time)", 3.0, -6.0, 6.0, 0.25),
     }
 
     def show(rival: str, size: float, t: float, k: float) -> dict[str, str]:
@@ -77,11 +78,12 @@ def minimum_acceleration_explorer() -> Explorer:
 def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: one cube follows the optimum, another the projection.
 
-    An orange outline shows the optimum around the projection, too. The boundary conditions are
-    those of the paper, but three of them can be changed. The goal has a pale colour. The controls
-    are the ``turn``, as a fraction of the paper's; ``spin``, the last component of ω(1) in rad per
-    unit time; ``rise``, the last component of the final velocity in m per unit time; and the time
-    ``t``, which the play button moves (BK 6.3, BK (14), BK Fig. 5).
+    An orange outline shows the optimum around the projection, too, and texts show the costs of the
+    rotations until the time t, in rad². The boundary conditions are those of the paper, but three
+    of them can be changed. The goal has a pale colour. The controls are the ``turn``, as a fraction
+    of the paper's; ``spin``, the last component of ω(1) in rad per unit time; ``rise``, the last
+    component of the final velocity in m per unit time; and the time ``t``, which the play button
+    moves (BK 6.3, BK (14), BK Fig. 5).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -97,25 +99,27 @@ def cube_explorer() -> Explorer:
             artists |= {name: draw_box(ax, np.eye(4), _SIDE) for name in (f"{way} goal", way)}
             artists[f"{way} goal"].set_alpha(0.25)
             fig.text(left + 0.25, 0.94, way, ha="center")
+            artists[f"{way} cost"] = fig.text(left + 0.25, 0.87, "", ha="center")
         artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
         artists["difference"].set(edgecolor=COLOURS["x"], **_OUTLINE)
-        artists["difference name"] = new_name(ax, "optimum", color=COLOURS["x"])
-        fig.text(0.5, 0.02, "axes: 5 m long", ha="center")
+        fig.text(0.25, 0.02, "axes: 5 m long", ha="center")
+        fig.text(0.75, 0.02, "orange: the optimum", color=COLOURS["x"], ha="center")
     controls = {
         "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
         "spin": widgets.slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),
         "rise": widgets.slider("ḋ₃(1) (m/time)", 3.0, -20.0, 20.0, 1.0),
-        "t": widgets.stepped("time t", 0.0, 0.0, 1.0, 0.01),
+        "t": widgets.stepped("time t", 0.5, 0.0, 1.0, 0.01),
     }
 
     def show(turn: float, spin: float, rise: float, t: float) -> dict[str, str]:
         curves, said = _solved_poses(turn, spin, rise)
-        for way, curve in zip(_WAYS, curves, strict=True):
+        now = round(t * (len(_COST_TIMES) - 1))
+        for way, curve, spent in zip(_WAYS, curves, _spent(turn, spin, rise), strict=True):
+            artists[f"{way} cost"].set_text(f"cost until now: {spent[now]:.1f}")
             artists[f"{way} way"].set_data_3d(*curve(_TIMES)[:, :3, 3].T)
             move_box(artists[f"{way} goal"], curve(1.0), _SIDE)
             move_box(artists[way], curve(t), _SIDE)
         move_box(artists["difference"], curves[0](t), _SIDE)
-        put_name(artists["difference name"], curves[0](t)[:3, 3] - [0, 0, 3.6])
         return {**said, "apart now": apart(*(curve(t)[:3, :3] for curve in curves))}
 
     return Explorer("The cube of Figure 5", fig, artists, controls, show, plays="t")
@@ -139,6 +143,16 @@ def _solved_poses(turn: float, spin: float, rise: float) -> Solved:
     ends = *poses, *rb.twist_from_rates(poses, w, d_dot)
     best = rb.minimum_acceleration(*ends)
     return _compared("projection", best, rb.projected_cubic(*ends))
+
+
+@lru_cache(maxsize=64)
+def _spent(turn: float, spin: float, rise: float) -> rb.Array:
+    """Return the costs of the rotation until each time, shape (2, times), for both curves."""
+    curves, _ = _solved_poses(turn, spin, rise)
+    rates = [curve.state(_COST_TIMES).acceleration[:, :3] for curve in curves]
+    costs = [w @ curve.body.inertia * w for w, curve in zip(rates, curves, strict=True)]
+    spent: rb.Array = cumulative_simpson(np.sum(costs, axis=-1), x=_COST_TIMES, initial=0)
+    return spent
 
 
 def _compared(rival: str, *curves: rb.Curve) -> Solved:

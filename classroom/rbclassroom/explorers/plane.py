@@ -21,7 +21,7 @@ _FRAMES = {"world": (COLOURS["z"], "#D6E6F2", "-"), "body": (COLOURS["x"], "none
 _RATES = {
     "vx": ("vx (m/s)", 1.0, 1.0, 0.1),
     "vy": ("vy (m/s)", 0.0, 1.0, 0.1),
-    "omega": ("vθ (°/s)", 0.0, 90.0, 5.0),
+    "omega": ("vθ (°/s)", 45.0, 90.0, 5.0),
 }
 """The label, first value, greatest value and step of each velocity of a command."""
 _START = np.radians([-20.0, 110.0])
@@ -53,7 +53,7 @@ def planar_explorer() -> Explorer:
         for i, nth in enumerate(("1st", "2nd"), start=1)
         for name, (label, first, high, step) in _RATES.items()
     }
-    controls["t"] = widgets.stepped("time t (s)", 0.0, 0.0, 2 * _LASTS, 2 * _LASTS / _STEPS)
+    controls["t"] = widgets.stepped("time t (s)", 3.0, 0.0, 2 * _LASTS, 2 * _LASTS / _STEPS)
 
     def show(t: float, **velocities: float) -> dict[str, str]:
         now, said, places = round(t / (2 * _LASTS) * _STEPS), {}, list[rb.Array]()

@@ -13,6 +13,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 import pooch
+from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
 import rbcourse
@@ -21,7 +22,7 @@ from rbclassroom.explorers.explorer import Explorer, numbers
 from rbclassroom.explorers.paths import JOINED
 from rbclassroom.figures import FORMS
 from rbcourse.draw.display import Player
-from rbcourse.draw.space import IN_SPACE, scenes
+from rbcourse.draw.space import IN_SPACE, Faces, scenes
 from rbcourse.files import replace_file
 
 _ABOUT = "This is a recording. In the lesson, with Python, you can move every control in all steps."
@@ -39,10 +40,7 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "flip": ({"axis": ["axis 1", "axis 2", "axis 3"]}, 1),
     "interpolation": ({"yaw1": range(-160, 141, 60), "pitch1": [-80, 0]}, 5),
     "minimum_acceleration": ({"rival": list(FORMS), "size": [0.5, 1, 1.5]}, 2),
-    "planar": ({"omega1": range(-90, 91, 45), "omega2": range(-90, 91, 45)}, 2),
     "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
-    "rotation": ({"alpha": range(-160, 141, 60), "gamma": range(-160, 141, 60)}, 5),
-    "screw": ({"tilt": range(0, 91, 15)}, 2),
     "smoothing": ({"noise": [0.2, 1, 2, 5]}, 3),
     "spline": ({"pitch": [-60, -40, -20, 20, 60], "third": [2, 2.5, 3]}, 2),
     "timing": ({"angular_speed": [0.5, 1, 2], "acceleration": [0.5, 1, 2, 4, 6]}, 4),
@@ -50,8 +48,15 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
 """The recorded values of controls of each explorer, and the stride of the control that plays."""
 COMPUTED = Path(__file__).with_name("computed.js").read_text(encoding="utf-8")
 """The JavaScript of the explorers that pages compute; it follows ``ENGINE``."""
-SCRIPTED = ["arm", "projection", "theta"]
-"""The explorers that computed.js computes."""
+SCRIPTED: dict[str, Sequence[str]] = {
+    "arm": ["theta0", "theta1", "t"],
+    "planar": ["omega1", "omega2", "t"],
+    "projection": ["e12", "e23", "e33", "pull"],
+    "rotation": ["alpha", "beta", "gamma"],
+    "screw": ["angle", "tilt", "t"],
+    "theta": ["angle", "t"],
+}
+"""The explorers that computed.js computes, and their controls; the other controls are fixed."""
 _SLOWEST_FIRST = sorted(
     [*MOVED, *SCRIPTED], key=["rotation", "projection", "spline"].__contains__, reverse=True
 )
@@ -106,14 +111,19 @@ def record(
 
 
 def computed(explorer: Explorer, name: str) -> Player:
-    """Return an explorer as a figure that computed.js moves, in all steps of all controls."""
+    """Return an explorer as a figure that computed.js moves, in all steps of its controls."""
     now, plays, height = explorer.values, explorer.plays, explorer.display.size[1]
     shown = explorer.state()
     still = explorer.draw(shown.shown, zoom=2)
     explorer.state(**{plays: explorer.steps[len(explorer.steps) // 2]})  # nothing is empty here
-    drag = (
-        ". Drag in the picture, or move the sliders." if explorer.picture.made["clickable"] else ""
-    )
+    stays = [
+        f"{control.description} = {_text(now[key])}"
+        for key, control in explorer.controls.items()
+        if key not in SCRIPTED[name]
+    ]
+    more = f". Fixed here: {'; '.join(stays)}" if stays else ""
+    if explorer.picture.made["clickable"]:
+        more += ". Drag in the picture, or move the sliders."
     fig = next(iter(explorer.artists.values())).figure
     inside = [artist for scene in scenes(fig) for artist in scene.artists]
     fixed = {"": [artist for artist in inside if artist not in explorer.artists.values()]}
@@ -128,13 +138,15 @@ def computed(explorer: Explorer, name: str) -> Player:
     controls = list[dict[str, Any]]()
     for key, control in explorer.controls.items():
         values = explorer.steps if key == plays else _values(control)
+        values = values if key in SCRIPTED[name] else [now[key]]
         texts = control._options_labels if key == plays else [_text(value) for value in values]
         first = int(np.argmin(np.abs(np.array(values) - now[key])))
         controls.append({"label": control.description, "values": texts, "first": first})
+        controls[-1]["plays"] = key == plays
     return Player(
         f"{name}_explorer",
         shown.texts[-1],
-        f"<figcaption>{html.escape(explorer.name)}{drag}</figcaption>",
+        f"<figcaption>{html.escape(explorer.name + more)}</figcaption>",
         still,
         explorer.background,
         explorer.display,
@@ -151,7 +163,10 @@ def _places(artist: Any, height: int) -> dict[str, Any]:
     """Return the map from the coordinates of an artist to pixels, and the place of a name."""
     if isinstance(artist, IN_SPACE):
         scale, middle = artist.axes.sight().scale, artist.axes.sight().middle
-        return {"axes": [part for x in middle for part in (scale, -scale * x)]}
+        axes = [part for x in middle for part in (scale, -scale * x)]
+        if isinstance(artist, Faces):
+            return {"axes": axes, "colours": [to_hex(colour) for colour in artist._colours]}
+        return {"axes": axes}
     to_pixels = artist.axes.transData.transform
     x, y = to_pixels([[0, 0], [1, 1]]).T
     axes = [x[1] - x[0], x[0], y[0] - y[1], height - y[0]]

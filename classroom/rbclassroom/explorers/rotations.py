@@ -18,8 +18,14 @@ from rbcourse.sampling import sample_rotation_naive, uniformity_tests
 _BOX = np.array([1.3, 0.8, 0.25])
 _REACH = float(np.linalg.norm(_BOX)) / 2
 _LEAST = 1.05
-_ENDS = {"first turn": 1.3, "second turn": _LEAST, "third turn": _LEAST, "one axis for all": 1.23}
-"""The axes of turns, and the distances of their named ends from the origin."""
+_ENDS = {
+    "first turn": (1.3, 0.65),
+    "second turn": (_LEAST, 0.87),
+    "third turn": (_LEAST, 0.71),
+    "one axis for all": (1.23, 1.03),
+}
+"""The axes of turns, the distances of their named ends from the origin, and the widths of names."""
+_LINE = 0.28  # the height of a name
 _SAMPLERS = {"three angles": sample_rotation_naive, "uniform": rb.sample_rotation}
 _MOST = 2000
 _BINS = np.linspace(-1, 1, 21)
@@ -43,7 +49,6 @@ def rotation_explorer() -> Explorer:
         artists["one axis for all"] = new_line(ax, ls=":", color="black", lw=3)
         artists["one axis for all name"] = new_name(ax, "one axis for all")
         artists |= _axes_of(ax, "body", ls="-", lw=3.5)
-        sizes = [artists[f"{name} name"].get_window_extent().size + 8 for name in _ENDS]
     controls = {
         "alpha": widgets.slider("yaw α (°)", 20.0, -180.0, 180.0, 1.0),
         "beta": widgets.stepped("pitch β (°)", -20.0, -90.0, 90.0, 1.0),
@@ -62,9 +67,9 @@ def rotation_explorer() -> Explorer:
         turns = np.array([[0, 0, 1], second, R[:, 0], axis])
         # the last name is not at the ends where the other names are
         sides = -1, -1, -1, np.copysign(1, turns[:3].sum(axis=0) @ axis)
-        for (name, far), side, along, size in zip(_ENDS.items(), sides, turns, sizes, strict=True):
+        for (name, (far, wide)), side, along in zip(_ENDS.items(), sides, turns, strict=True):
             artists[name].set_data_3d(*np.outer(side * along, [-_LEAST, far]))
-            place = _beyond(side * far * along, sight, size / sight.scale)
+            place = _beyond(side * far * along, sight, np.array([wide, _LINE]))
             put_name(artists[f"{name} name"], place)
         artists["one axis for all name"].set_text("one axis for all" if angle > 0 else "")
         said = {
@@ -85,7 +90,7 @@ def rotation_explorer() -> Explorer:
 def _beyond(end: rb.Array, sight: Sight, size: rb.Array) -> rb.Array:
     """Return the place of a name of this size, beyond an end and, in this view, beside the box."""
     plane = np.stack([sight.right, sight.up])
-    seen = plane @ end
+    seen = plane @ end + [0, 1e-9]  # the name of an axis that points to the eye is above it
     far = float(np.linalg.norm(seen))
     towards = seen / max(far, 1e-9)
     slope = np.abs(towards)
@@ -115,7 +120,7 @@ def projection_explorer() -> Explorer:
         "e12": widgets.slider("y leans", 0.8, -1.0, 1.0, 0.05),
         "e23": widgets.slider("z leans", 0.0, -1.0, 1.0, 0.05),
         "e33": widgets.slider("z stretched", 0.0, -2.0, 1.0, 0.05),
-        "pull": widgets.stepped("pull (0 to 1)", 0.0, 0.0, 1.0, 0.01),
+        "pull": widgets.stepped("pull (0 to 1)", 0.6, 0.0, 1.0, 0.01),
     }
 
     def show(e12: float, e23: float, e33: float, pull: float) -> dict[str, str]:

@@ -21,6 +21,13 @@
     else if (element.tabIndex < 0) faults.push(`scrolls by mouse only: ${name(element)}`);
   }
 
+  // Check that a finger can use the controls.
+  for (const element of innerWidth < 500 ? content.querySelectorAll("figure :is(button, input), summary, .poll button, .buttons > *") : []) {
+    const { width, height } = element.getBoundingClientRect();
+    const least = element.type === "range" ? 220 : 44;
+    if (shown(element) && (height < 43.5 || width < least - 0.5)) faults.push(`small for a finger, ${width} × ${height}: ${name(element)}`);
+  }
+
   // Check that texts do not overlap, have enough contrast, and have lines of moderate length.
   const walker = document.createTreeWalker(content, NodeFilter.SHOW_TEXT), boxes = [];
   for (let node; (node = walker.nextNode()); ) {

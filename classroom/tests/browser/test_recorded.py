@@ -14,6 +14,7 @@ from rbclassroom import explorers
 from rbclassroom.explorers import recorded
 from rbcourse.draw import animate
 
+ROWS = "div:has(> input), .rbcourse-choice"
 HOUR = 3_600_000  # ms
 
 
@@ -64,23 +65,26 @@ def test_a_player_shows_the_drawing(timed):
     assert timed.locator("button, img[data-read]").count() == 0
 
 
-@pytest.mark.parametrize("name", ["screw", "chain", "random", "minimum_acceleration", "cube"])
+@pytest.mark.parametrize("name", ["spline", "chain", "random", "minimum_acceleration", "cube"])
 def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
     timed.set_viewport_size({"width": 1400, "height": 1000})
     show(timed, name)
     explorer, (moved, stride) = getattr(explorers, f"{name}_explorer")(), recorded.MOVED[name]
     steps = explorer.steps[explorer.time.index % stride :: stride]
-    canvas, sliders = timed.locator("canvas"), timed.locator("input").all()
-    assert len(sliders) == len(moved) + 1
+    canvas = timed.locator("canvas")
+    controls = dict(zip([*moved, explorer.plays], timed.locator(ROWS).all(), strict=True))
     canvas.evaluate("(canvas) => { canvas.style = 'display: block; width: 1120px'; }")
     rng = np.random.default_rng(1)
     for _ in range(2):
         now = {}
-        for slider, (each, values) in zip(
-            sliders, [*moved.items(), (explorer.plays, steps)], strict=True
-        ):
+        for each, values in {**moved, explorer.plays: steps}.items():
             k = int(rng.integers(len(values)))
-            slider.fill(str(k))
+            if isinstance(values[k], str):
+                controls[each].get_by_role("button").nth(k).click()
+                pressed = controls[each].locator("[aria-pressed=true]")
+                assert pressed.all_inner_texts() == [values[k]]
+            else:
+                controls[each].locator("input").fill(str(k))
             now[each] = values[k]
         state = explorer.state(**now)
         check_alike(shown(canvas), explorer.draw(state.shown, zoom=2), explorer.background)
@@ -91,8 +95,12 @@ def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
         assert rows == [list(pair) for pair in said]
         seen = timed.locator(".rbcourse-view output").all_inner_texts()
         assert canvas.get_attribute("aria-label") == " ".join([line, *seen])
-    for slider, name in zip(sliders, [*moved, explorer.plays], strict=True):
-        assert slider.get_attribute("aria-label") == explorer.controls[name].description
+    for each, row in controls.items():
+        label, slider = explorer.controls[each].description, row.locator("input")
+        if not slider.count():
+            assert row.get_attribute("aria-label") == label
+            continue
+        assert slider.get_attribute("aria-label") == label
         box = slider.bounding_box()
         timed.mouse.click(box["x"] + 1, box["y"] + box["height"] / 2)
         low = slider.get_attribute("aria-valuetext"), shown(canvas)
@@ -109,7 +117,7 @@ def test_keys_and_mouse_move_a_recorded_explorer(name, timed):
         assert shown(canvas) != before
     timed.clock.pause_at(HOUR)
     assert timed.locator("[role=status]").inner_text() in canvas.get_attribute("aria-label")
-    time = sliders[-1]
+    time = timed.locator("input").last
     time.fill("0")
     timed.get_by_role("button", name="play or pause").press("Enter")
     timed.clock.run_for(3 * stride * explorer.play.interval)
@@ -130,8 +138,8 @@ def test_players_show_few_steps_if_the_user_asks_for_less_motion(timed):
 def test_a_page_without_scripts_shows_a_still_picture(context):
     plain = context.browser.new_context(java_script_enabled=False)
     page = plain.new_page()
-    show(page, "screw")
-    alt = html.unescape(re.search(r'alt="([^"]*)"', recorded.living("screw"))[1])
+    show(page, "spline")
+    alt = html.unescape(re.search(r'alt="([^"]*)"', recorded.living("spline"))[1])
     assert page.get_by_role("img", name=alt, exact=True).is_visible()
     page.get_by_text("About this picture").click()
     assert page.get_by_text("with Python, you can move every control").is_visible()

@@ -83,6 +83,32 @@ def test_every_slide_fits_and_is_legible_from_the_last_row(context, path, size, 
         assert letters > 0.025 * 1080, (number, alt, letters)
 
 
+# Move each slider of the slide that is shown, and return the labels of those that have no effect.
+DEAD = """() => {
+  const section = Reveal.getCurrentSlide(), found = [];
+  for (const slider of section.querySelectorAll("input[type=range]")) {
+    const output = slider.parentElement.querySelector("output"), before = output.textContent;
+    slider.value = +slider.value === +slider.max ? 0 : slider.max;
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+    if (output.textContent === before) found.push(slider.ariaLabel);
+  }
+  return found;
+}"""
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.stem[:2])
+def test_every_slider_of_a_deck_works(context, path):
+    with watched(context) as page:
+        opened(page, of(path))
+        count = page.evaluate("sections.length")
+        for number in range(count):
+            if not page.evaluate(f"sections[{number}].querySelector('figure > script[type]')"):
+                continue
+            page.evaluate(f"Reveal.slide(...Object.values(Reveal.getIndices(sections[{number}])))")
+            page.wait_for_function(f"sections[{number}].querySelector('figure canvas')")
+            assert page.evaluate(DEAD) == [], (path.stem, number + 1)
+
+
 def test_decks_are_small_enough_for_mail():
     decks = [path for path in SLIDES.glob("*.html") if not path.stem.endswith("_crib")]
     assert {path.stem for path in decks} == {path.stem for path in LESSONS}

@@ -112,5 +112,5 @@ def test_an_explorer_is_recorded_once_until_its_code_changes(tmp_path, monkeypat
     monkeypatch.setattr(recorded, "_version", lambda: next(versions))
     monkeypatch.setattr(type(made("theta")), "_repr_html_", lambda _: "<figure>", raising=False)
     for count in (1, 1, 2):
-        assert recorded.living("screw") == "<figure>"
-        assert asked == ["screw_explorer"] * count
+        assert recorded.living("spline") == "<figure>"
+        assert asked == ["spline_explorer"] * count

@@ -75,22 +75,35 @@ def test_texts_are_right_in_examples_of_the_lessons(name, values, key, text):
     assert notice(made(name)) == ""
 
 
+def test_an_explorer_opens_where_its_phenomenon_is_visible():
+    for name in ("planar", "projection", "screw", "cube", "body", "minimum_acceleration", "theta"):
+        made(name).restart()
+    ends = [points(made("planar").artists[f"{frame} way"])[-1] for frame in ("world", "body")]
+    assert off(*ends) > 1  # m
+    assert off(tips("projection", "nearest"), tips("projection", "Gram–Schmidt")) > 0.2
+    corners = {name: made(name).artists for name in ("screw", "cube", "body")}
+    assert off(*(corners["screw"][each].corners for each in ("geodesic", "screw"))) > 0.3  # m
+    assert off(*(corners["body"][law].corners for law in ("as if a ball", "least torque"))) > 0.1
+    assert float(read_off(made("cube"))["apart now"].rstrip("°")) > 10
+    ratio = float(read_off(made("minimum_acceleration"))["their ratio"])
+    assert ratio > 1.05
+    assert abs(float(read_off(made("theta"))["θ(t)"]) - made("theta").values["t"]) > 0.05
+
+
 def test_no_poll_answer_is_visible_before_a_slider_is_moved():
-    for name in ("theta", "planar", "arm", "cube", "projection", "flip"):
+    for name in ("theta", "planar", "arm", "minimum_acceleration"):
         made(name).restart()
     theta, plan, arm = (made(name) for name in ("theta", "planar", "arm"))
     assert "f" not in theta.artists  # poll 3 asks for f
     assert theta.values["angle"] not in (90, 150)
-    assert made("cube").values == {"turn": 1.0, "spin": 1.0, "rise": 3.0, "t": 0.0}
-    assert off(tips("projection", "nearest"), np.eye(3)) < 1e-15
-    assert arm.values["t"] == plan.values["t"] == 0
+    assert plan.values["t"] < 4  # poll 2 asks for the ends
+    assert made("minimum_acceleration").values["k"] != 5  # poll 2 asks for case (c)
+    assert arm.values["t"] == 0
     links, way = (points(arm.artists[name]) for name in ("links", "way"))
     # the links lie on the pale links
     assert off(points(arm.artists["links"].axes.lines[0]), links) < 1e-15
     assert np.ptp(way, axis=0).max() < 1e-15
     assert made("spline")._first["t"] < 1  # the first jump is at 1 s
-    plan.put(t=4.0)
-    assert off(*(points(plan.artists[f"{frame} way"]) for frame in ("world", "body"))) < 1e-15
 
 
 AXES = {"the diagonal x + y + z": [1, 1, 1], "x,": [1, 0, 0], "y,": [0, 1, 0], "z,": [0, 0, 1]}
@@ -297,12 +310,15 @@ def test_both_cubes_agree_with_the_package():
         ends = np.eye(4), A1, *rb.twist_from_rates([np.eye(4), A1], w, d_dot)
         curves, costs = solved(rb.minimum_acceleration, rb.projected_cubic, ends)
         assert_compared(said, curves, costs, v["t"])
-        under = artists["difference name"].get_position_3d()
-        assert off(under, curves[0](v["t"])[:3, 3] - [0, 0, 3.6]) < 1e-11
         for name, left, curve in zip(("optimum", "projection"), (0, 280), curves, strict=True):
             boxes = {name: curve(v["t"]), f"{name} goal": A1, "difference": curves[0](v["t"])}
             for box, A in boxes.items():
                 assert_box(artists[box], A[:3, :3], 1.75, A[:3, 3])
+            until = np.linspace(0, max(v["t"], 1e-3), 501)
+            rates = np.gradient(curve.state(until).velocity[:, :3], until, axis=0, edge_order=2)
+            spent = 2 * np.trapezoid((rates**2).sum(axis=-1), until) * (v["t"] > 0)
+            said_now = float(artists[f"{name} cost"].get_text().partition(": ")[2])
+            assert abs(said_now - spent) < 0.06 + 1e-3 * spent
             way = points(artists[f"{name} way"])
             assert off(way, curve(TIMES)[:, :3, 3]) < 1e-11
             for places in (way, artists[name].corners, artists[f"{name} goal"].corners):

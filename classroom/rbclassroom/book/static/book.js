@@ -80,6 +80,7 @@ addEventListener("DOMContentLoaded", () => {
     const seen = new IntersectionObserver(([{ isIntersecting }]) => {
       if (!isIntersecting) return;
       seen.disconnect();
+      slider.value = 0;
       button.click();
       const end = () => {
         if (button.textContent === "▶") return; // the reader has paused the picture
