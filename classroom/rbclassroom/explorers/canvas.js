@@ -5,7 +5,7 @@ export default {
     const [time, play, said, ...others] = await Promise.all(parts.map((id) => model.widget_manager.get_model(id)));
     const count = time.get("_options_labels").length;
     const canvas = document.createElement("canvas"), back = new Image();
-    canvas.style = `display: block; width: ${size[0]}px; max-width: 100%; aspect-ratio: ${size.join(" / ")}`;
+    canvas.style = `display: block; width: 100%; aspect-ratio: ${size.join(" / ")}`;
     back.src = URL.createObjectURL(new Blob([background], { type: "image/png" }));
     await back.decode();
     URL.revokeObjectURL(back.src);

@@ -218,8 +218,9 @@ rbcourseDisplay.computed = (() => {
   }
 
   // Names stand beyond the ends of axes and, in the first view, beside the box.
-  const { right, up } = rbcourseScene.sight([-55, 20]), LEAST = 1.05;
+  const LEAST = 1.05;
   function beyond(end, size) {
+    const { right, up } = rbcourseScene.sight([-55, 20]);
     const seen = [dot(right, end), dot(up, end) + 1e-9], far = hypot(...seen), toward = scaled(1 / max(far, 1e-9), seen);
     const out = size.map((x, k) => x / 2 / max(abs(toward[k]), 1e-9)), half = scaled(0.5, size);
     const more = max(far + Math.min(...out), hypot(1.3, 0.8, 0.25) / 2 + dot(half, toward.map(abs))) - far;

@@ -23,6 +23,10 @@ from rbcourse.draw.display import ENGINE, Display, joined
 from rbcourse.draw.pictures import data_url, drawn
 
 _STYLES = ["default", "rbcourse.rbcourse"]
+# the labels of sliders are above them, so that a slider has the width of the panel
+_PANEL = """.rbcourse-panel .widget-slider { flex-wrap: wrap; height: auto; }
+.rbcourse-panel .widget-slider > .widget-label { flex: 1 0 100%; max-width: none; text-align: left; }
+"""
 
 
 class Canvas(anywidget.AnyWidget):
@@ -36,6 +40,7 @@ class Canvas(anywidget.AnyWidget):
     """
 
     _esm = ENGINE + Path(__file__).with_name("canvas.js").read_text(encoding="utf-8")
+    _css = _PANEL
     made = traitlets.Dict().tag(sync=True)
     run = traitlets.Dict().tag(sync=True)
 
@@ -105,7 +110,9 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
             "clickable": point is not None,
             "parts": [part.model_id for part in (self.time, self.play, said, *others)],
         }
-        wide = {"flex": f"0 1 {self.display.width}px", "min_width": "0"}
+        # the picture grows with the cell
+        most = f"{1.5 * self.display.width:.0f}px"
+        wide = {"flex": f"2 1 {self.display.width}px", "min_width": "0", "max_width": most}
         self.picture = Canvas(made=made, layout=wide)
         panel = ipywidgets.VBox(
             [ipywidgets.HBox([self.play, self.reset]), *self.controls.values(), said],
