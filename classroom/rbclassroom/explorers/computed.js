@@ -70,6 +70,16 @@ rbcourseDisplay.computed = (() => {
       return math.matrix_from_quaternion([cos(angle / 2), ...scaled(angle ? sin(angle / 2) / angle : 0, w)]);
     },
     matrix_from_zyx: (angles) => angles.map((angle, k) => math.exp_so3(scaled(angle, unit[2 - k]))).reduce(math.matmul),
+    quaternion_from_zyx(angles) {
+      const [[a, b, c], [d, e, f]] = [cos, sin].map((part) => angles.map((x) => part(x / 2)));
+      return [a * b * c + d * e * f, a * b * f - d * e * c, a * e * c + d * b * f, d * b * c - a * e * f];
+    },
+    // The quaternion at a share of the short arc between two unit quaternions.
+    slerp(p, q, t) {
+      const near = scaled(dot(p, q) < -9e-16 ? -1 : 1, q), angle = atan2(hypot(...plus(near, scaled(-1, p))), hypot(...plus(near, p)));
+      if (angle < 1e-9) return p;
+      return plus(scaled(sin(2 * (1 - t) * angle) / sin(2 * angle), p), scaled(sin(2 * t * angle) / sin(2 * angle), near));
+    },
     // The pose in the plane after a motion with the velocities (vx, vy, vθ) in the frame of the body.
     exp_planar([x, y, angle]) {
       const s = angle ? sin(angle) / angle : 1, c = angle ? (1 - cos(angle)) / angle : 0;
@@ -285,6 +295,39 @@ rbcourseDisplay.computed = (() => {
     },
   };
 
+  const interpolation = {
+    title: "Four ways to the goal",
+    show([...values]) {
+      const t = values.pop(), times = range(201).map((k) => k / 200), points = {}, said = [];
+      const ends = [values.slice(0, 3), values.slice(3)].map((angles) => angles.map(radians));
+      const blend = ([a, b], share) => plus(scaled(1 - share, a), scaled(share, b));
+      const R = ends.map(math.matrix_from_zyx), logs = R.map(math.log_so3), q = ends.map(math.quaternion_from_zyx);
+      const ways = {
+        "ZYX angles": (share) => math.matrix_from_zyx(blend(ends, share)),
+        "matrix entries": (share) => range(3).map((i) => blend([R[0][i], R[1][i]], share)),
+        quaternions: (share) => math.matrix_from_quaternion(math.slerp(...q, share)),
+        "rotation vectors": (share) => math.exp_so3(blend(logs, share)),
+      };
+      for (const [way, at] of Object.entries(ways)) {
+        const path = times.map(at), now = at(t), nose = path.filter((_, k) => k % 4 === 0).map((M) => M.map((row) => row[0]));
+        points[way] = box([1.3, 0.8, 0.25], now, [0, 0, 0]);
+        points[`${way} path`] = nose;
+        points[`${way} start`] = nose.slice(0, 1);
+        points[`${way} goal`] = nose.slice(-1);
+        points[`${way} nose`] = [0.65, 1].map((far) => now.map((row) => far * row[0]));
+        if (way === "matrix entries") {
+          const det = math.det(now), fate = det > 1 - 1e-9 ? "a rotation" : "not a rotation";
+          said.push([way, `${fate}, determinant ${numbers([det], 2)}`]);
+          if (det < 1e-9) said.push(["its box", "squashed to a line"]);
+        } else {
+          const turned = path.slice(1).reduce((sum, M, k) => sum + math.angle_between(path[k], M), 0);
+          said.push([way, `${numbers([degrees(turned)], 0)}° in all`]);
+        }
+      }
+      return { points, said };
+    },
+  };
+
   // Return the drawing of a face. It is the lighter, the more the face is turned to the light, as in space.py.
   function shaded({ style: [old, ...style] }, corners, colour, middle) {
     const n = rbcourseScene.normal(corners), side = Math.sign(dot(n, plus(mean(corners), scaled(-1, middle))));
@@ -318,7 +361,7 @@ rbcourseDisplay.computed = (() => {
       return point([(x - x0) / sx, (y - y0) / sy], values);
     }),
   });
-  const all = { arm, planar: plan, projection, rotation: orientation, screw, theta };
+  const all = { arm, interpolation, planar: plan, projection, rotation: orientation, screw, theta };
   for (const [name, explorer] of Object.entries(all)) rbcourseDisplay.explorers[name] = placed(explorer);
   return { math, ...all };
 })();

@@ -25,7 +25,9 @@ from rbcourse.draw.pictures import data_url, drawn
 _STYLES = ["default", "rbcourse.rbcourse"]
 # the labels of sliders are above them, so that a slider has the width of the panel
 _PANEL = """.rbcourse-panel .widget-slider { flex-wrap: wrap; height: auto; }
-.rbcourse-panel .widget-slider > .widget-label { flex: 1 0 100%; max-width: none; text-align: left; }
+.rbcourse-panel .widget-slider > .widget-label {
+  flex: 1 0 100%; max-width: none; text-align: left;
+}
 """
 
 

@@ -38,7 +38,6 @@ MOVED: dict[str, tuple[Mapping[str, Sequence[Any]], int]] = {
     "cube": ({"spin": range(-5, 6, 2)}, 2),
     "double_cover": ({"untwist": [tenths / 10 for tenths in range(11)]}, 3),
     "flip": ({"axis": ["axis 1", "axis 2", "axis 3"]}, 1),
-    "interpolation": ({"yaw1": range(-160, 141, 60), "pitch1": [-80, 0]}, 5),
     "minimum_acceleration": ({"rival": list(FORMS), "size": [0.5, 1, 1.5]}, 2),
     "random": ({"sampler": ["three angles", "uniform"], "seed": range(3)}, 4),
     "smoothing": ({"noise": [0.2, 1, 2, 5]}, 3),
@@ -50,6 +49,7 @@ COMPUTED = Path(__file__).with_name("computed.js").read_text(encoding="utf-8")
 """The JavaScript of the explorers that pages compute; it follows ``ENGINE``."""
 SCRIPTED: dict[str, Sequence[str]] = {
     "arm": ["theta0", "theta1", "t"],
+    "interpolation": ["yaw1", "pitch1", "t"],
     "planar": ["omega1", "omega2", "t"],
     "projection": ["e12", "e23", "e33", "pull"],
     "rotation": ["alpha", "beta", "gamma"],

@@ -59,19 +59,23 @@ def name_ends(ax: Axes, gap: float = 0.1) -> None:
 
     The labels are moved up or down as little as possible (least squares), until they are at least
     `gap` apart, and at least half as far from the top and the bottom of the axes. The unit of `gap`
-    is the height of the axes.
+    is the height of the axes. A thin line leads to a label that has moved.
     """
     ax.autoscale_view()
     lines = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
     maps = [line.get_transform() - ax.transAxes for line in lines]
     xy = np.array([x.transform(line.get_xydata())[-1] for x, line in zip(maps, lines, strict=True)])
     order, steps = np.argsort(xy[:, 1], kind="stable"), gap * np.arange(len(lines))
-    limits = gap / 2, 1 - gap / 2 - steps[-1]
+    limits, ends = (gap / 2, 1 - gap / 2 - steps[-1]), xy[:, 1].copy()
     xy[order, 1] = np.clip(isotonic_regression(xy[order, 1] - steps).x, *limits) + steps
     style: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
-    for (x, y), line in zip(xy, lines, strict=True):
+    moved = abs(xy[:, 1] - ends) > 0.03
+    for (x, y), end, line, is_moved in zip(xy, ends, lines, moved, strict=True):
         name, colour = str(line.get_label()), line.get_color()
-        ax.annotate(name, (x, y), (7, 0), color=colour, va="center", **style)
+        if is_moved:
+            lead: Any = {"transform": ax.transAxes, "clip_on": False, "lw": 1}
+            ax.plot([x + 0.012, x + 0.03], [end, y], color=colour, **lead)
+        ax.annotate(name, (x, y), (14 if any(moved) else 7, 0), color=colour, va="center", **style)
 
 
 def quantile(x: Array, share: float, decimals: int = 8) -> Array:

@@ -174,9 +174,10 @@ def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
     for body, cells in groups(data, "body").items():
         each = (f"{title} {shares(cells[f'{x} median [1]'])}" for x, title in titles.items())
         said.append(f"{body}: {', '.join(each)}")
+    rows = "a row for each body and " if len(said) > 1 else ""
     return (
-        "Median of the cost over the optimum minus 1, with a row for each body and a column for "
-        "each curve. In each heat map, to the right the displacement grows from 0 to 180 degrees, "
-        "and upwards the end velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
+        f"Median of the cost over the optimum minus 1, with {rows}a column for each curve. In each "
+        "heat map, to the right the displacement grows from 0 to 180 degrees, and upwards the end "
+        "velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
         f"{'; '.join(said)}."
     )

@@ -86,7 +86,7 @@ def acceleration_table(curves: Mapping[str, Curve], component: int) -> Table:
 def draw_accelerations(ax: Axes, data: Table, knots: ArrayLike) -> None:
     """Draw an `acceleration_table`, with a dotted line at each knot."""
     for knot in np.asarray(knots):
-        ax.axvline(knot, color=COLOURS["reference"], lw=0.8, ls=":")
+        ax.axvline(knot, color=COLOURS["reference"], lw=1.5, ls=":")
     for name, _, values in _profiles(data):
         ax.plot(data[_TIME], values, label=name, **_CURVES[name])
     t = np.asarray(data[_TIME])
@@ -184,8 +184,6 @@ def draw_excesses(ax: Axes, data: Table) -> None:
         ax.loglog(ticks, values, label=name, **EXCESSES[name])
     ax.set(xlabel="turn of a leg (°)", ylabel="excess over the optimum")
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
-    powers = [-7, -5, -3, -1]
-    names = [rf"$\mathregular{{10^{{{power + 2}}}}}$ %" for power in powers]
-    ax.set_yticks(np.power(10.0, powers), names)
+    ax.set_yticks([1e-7, 1e-5, 1e-3, 1e-1], ["0.00001 %", "0.001 %", "0.1 %", "10 %"])
     ax.minorticks_off()
     name_ends(ax)

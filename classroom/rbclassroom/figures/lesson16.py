@@ -10,7 +10,7 @@ from scipy.interpolate import make_smoothing_spline
 import rbcourse as rb
 from rbclassroom.figures import name_lines, named, rounded
 from rbcourse import Array, Curve
-from rbcourse.draw.save import COLOURS, PALE, Table
+from rbcourse.draw.save import COLOURS, Table
 
 MARKS = np.array([[0.0, 0, 0], [70, 35, -20], [140, -20, 40], [200, 30, 10], [170, 60, -30]])
 """Yaw, pitch and roll at 0, 1, 2, 3 and 4 s, in degrees."""
@@ -99,11 +99,13 @@ def draw_validation(ax: Axes, data: Table, best: float) -> None:
     periods, errors = np.asarray(data["period [s]"]), named(" [rad]", data)
     for name, values in errors.items():
         ax.plot(periods, np.degrees(values), label=name, **_ERRORS[name])
-    ax.axvline(best, color=PALE, lw=1, ls=":")
+    ax.axvline(best, color=COLOURS["reference"], lw=1.5, ls=":")
+    ax.text(1.05 * best, 3.2, "chosen", color=COLOURS["reference"])
     ax.set(xscale="log", yscale="log", xlabel="period (s)", ylabel="distance (°)")
-    ax.set(xlim=(periods[0], periods[-1]), ylim=(0.1, 20))
+    ax.set(xlim=(periods[0], periods[-1]), ylim=(0.1, 6))
     ax.set_xticks([0.03, 0.1, 0.3, 1], ["0.03", "0.1", "0.3", "1"])
-    ax.set_yticks([0.1, 1, 10], ["0.1", "1", "10"])
+    ax.set_yticks([0.1, 0.3, 1, 3], ["0.1", "0.3", "1", "3"])
+    ax.minorticks_off()
     name_lines(ax, {"from the measured poses": (0.2, 0.6), "from the hand": (0.12, 0.22)})
     name_lines(ax, {"from an omitted pose": (0.06, 2)})
 

@@ -15,6 +15,7 @@ from rbclassroom.explorers.recorded import COMPUTED, SCRIPTED, living
 from rbcourse.arm import LINKS, arm_forward_kinematics, arm_inverse_kinematics
 from rbcourse.draw.display import ENGINE
 from rbcourse.draw.space import Faces
+from rbcourse.quaternion import quaternion_from_zyx
 from rbcourse.straight_line import line_singular_value, theta
 
 NAMES = list(SCRIPTED)
@@ -53,6 +54,8 @@ def test_functions_agree_with_those_in_python(page):
     }
     angles = rng.uniform(-np.pi, np.pi, (1000, 3))
     M, R = rng.normal(size=(1000, 3, 3)), rb.sample_rotation(1001, rng=rng)
+    quaternions = rb.quaternion_from_matrix(R)
+    arcs = list(zip(quaternions[1:], quaternions[:-1], t, strict=True))
     gap = np.linalg.svd(M, compute_uv=False)[:, 1:] @ [1, 0]
     gap += np.sign(np.linalg.det(M)) * np.linalg.svd(M, compute_uv=False)[:, 2]
     M, G = M[gap > 1e-2], rb.projection.orthonormalize_gram_schmidt(M)
@@ -61,11 +64,16 @@ def test_functions_agree_with_those_in_python(page):
         "orthonormalize_gram_schmidt": (G[gap > 1e-2], ([each] for each in M)),
         "det": (np.linalg.det(M), ([each] for each in M)),
         "angle_between": (rb.angle_between(R[1:], R[:-1]), zip(R[1:], R[:-1], strict=True)),
-        "matrix_from_quaternion": (R, ([q] for q in rb.quaternion_from_matrix(R))),
-        "quaternion_from_matrix": (rb.quaternion_from_matrix(R), ([each] for each in R)),
+        "matrix_from_quaternion": (R, ([each] for each in quaternions)),
+        "quaternion_from_matrix": (quaternions, ([each] for each in R)),
         "exp_so3": (rb.exp_so3(4 * M[:, 0]), ([4 * each[0]] for each in M)),
         "log_so3": (rb.log_so3(R), ([each] for each in R)),
         "matrix_from_zyx": (rb.matrix_from_zyx(angles), ([each] for each in angles)),
+        "slerp": (
+            np.array([rb.slerp(*each) for each in arcs]),
+            arcs,
+        ),
+        "quaternion_from_zyx": (quaternion_from_zyx(angles), ([each] for each in angles)),
         "exp_planar": (rb.planar.exp_planar(angles), ([each] for each in angles)),
         "compose_planar": (
             rb.planar.compose_planar(angles, angles[::-1]),
