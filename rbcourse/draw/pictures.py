@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from rbcourse.draw.space import not_in_space, scenes
 
@@ -52,11 +53,13 @@ def drawn(
     return png(picture)
 
 
-def png(picture: Image.Image) -> bytes:
-    """Return a picture as a PNG in 256 colours, without dithering."""
-    content = io.BytesIO()
+def png(picture: Image.Image, cuts: str = "") -> bytes:
+    """Return a picture as a PNG in 256 colours, without dithering, with a text if it is given."""
+    content, texts = io.BytesIO(), PngInfo()
+    if cuts:
+        texts.add_text("cuts", cuts)
     few_colours = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
-    few_colours.save(content, "png", optimize=True)
+    few_colours.save(content, "png", optimize=True, pnginfo=texts)
     return content.getvalue()
 
 

@@ -12,6 +12,7 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -131,12 +132,33 @@ def save_figure(
 
 
 def as_png(fig: Figure) -> bytes:
-    """Return a figure as a PNG in 256 colours."""
+    """Return a figure as a PNG in 256 colours; its text "cuts" has the numbers of `cuts_of`."""
     content = io.BytesIO()
     if fig.get_layout_engine() is None:  # savefig would leave the figure with that of the style
         fig.set_layout_engine(PlaceHolderLayoutEngine(True, True))
     fig.savefig(content, format="png")
-    return png(Image.open(content))
+    return png(Image.open(content), " ".join(f"{cut:.3f}" for cut in cuts_of(fig)))
+
+
+def cuts_of(fig: Figure) -> list[float]:
+    """Return the places between columns of axes, as fractions of the width of a drawn figure.
+
+    A narrow column, such as the bar of colours, belongs to its left neighbour. There are no cuts if
+    a column has less than a fifth of the width, or if a text of the figure is over a cut.
+    """
+    width, columns = fig.bbox.width, list[list[float]]()
+    boxes = [box for ax in fig.axes if (box := ax.get_tightbbox())]
+    for low, high in sorted((float(box.x0), float(box.x1)) for box in boxes):
+        if columns and (low < columns[-1][1] or high - low < width / 8):
+            columns[-1][1] = max(columns[-1][1], high)
+        else:
+            columns.append([low, high])
+    cuts = [(left[1] + right[0]) / 2 for left, right in pairwise(columns)]
+    over = [each.get_window_extent().intervalx for each in [*fig.texts, *fig.legends]]
+    narrow = min(np.diff([0, *cuts, width])) < width / 5
+    if narrow or any(low < cut < high for cut in cuts for low, high in over):
+        return []
+    return [float(cut / width) for cut in cuts]
 
 
 def _turning(fig: Figure, name: str, alt: str, text: str) -> Player:

@@ -111,7 +111,8 @@ def with_picture_files(
     """Return HTML with pictures in files; by default a picture is loaded when it becomes visible.
 
     `known` maps the contents of pictures to their addresses. Other pictures are written to the
-    folder ``pictures`` inside `folder`. Pictures with ``data-wide`` scroll on phones.
+    folder ``pictures`` inside `folder`. On phones, book.js divides pictures with
+    ``data-cuts``; those with ``data-wide`` scroll.
     """
 
     def put(match: re.Match[str]) -> str:
@@ -121,9 +122,10 @@ def with_picture_files(
             (folder / "pictures").mkdir(parents=True, exist_ok=True)
             (folder / known[content]).write_bytes(content)
         with Image.open(io.BytesIO(content)) as still:
-            width, height = still.size
+            (width, height), cuts = still.size, still.info.get("cuts", "")
         before = match[1].replace('style="', f'style="aspect-ratio: {width}/{height}; ', 1)
-        before += " data-wide" * (width >= 1.8 * height)
+        if cuts or width >= 1.8 * height:
+            before += f' data-cuts="{cuts}"' if cuts else " data-wide"
         return f'{before} loading="{loading}" src="{known[content]}"'
 
     return _PICTURE.sub(put, shown)

@@ -64,6 +64,22 @@ addEventListener("DOMContentLoaded", () => {
   // The hint "drag to turn" disappears when the reader touches the picture.
   addEventListener("pointerdown", ({ target }) => target.closest("figure")?.classList.add("touched"));
 
+  // On a phone, the columns of a figure are shown one below another, at one scale.
+  for (const image of matchMedia("(max-width: 46em)").matches ? all("img[data-cuts]") : []) {
+    const cuts = [0, ...image.dataset.cuts.split(" ").map(Number), 1], part = document.createElement("span");
+    const sizes = cuts.slice(1).map((end, k) => end - cuts[k]), widest = Math.max(...sizes), [width, height] = image.style.aspectRatio.split("/");
+    part.append(...sizes.map((size, k) => {
+      const column = document.createElement("span"), copy = image.cloneNode();
+      column.className = "column";
+      column.style = `width: ${(100 * size) / widest}%; aspect-ratio: ${(size * width) / height}`;
+      copy.style = `--whole: ${100 / size}%; margin-left: ${(-100 * cuts[k]) / size}%`;
+      if (k) copy.alt = ""; // the first column has the description
+      column.append(copy);
+      return column;
+    }));
+    image.replaceWith(part);
+  }
+
   // The picture of the start page plays once when it becomes visible. All controls except
   // the slider are folded under "More".
   const hero = document.querySelector("figure.hero");
