@@ -128,7 +128,7 @@ rbcourseDisplay.computed = (() => {
           goal: [end],
           "goal name": [beside(end, end[1] - elbow[1], elbow[0] - end[0])],
           links: now,
-          "hand name": [beside(now[2], now[2][0] - now[1][0], now[2][1] - now[1][1])],
+          "hand name": hypot(...plus(end, scaled(-1, now[2]))) > 0.5 ? [beside(now[2], now[2][0] - now[1][0], now[2][1] - now[1][1])] : [],
         },
         said: [["angles", `(${numbers(q.map(degrees), 1)})°`], ["hand", `(${numbers(now[2], 2)}) m`]],
       };

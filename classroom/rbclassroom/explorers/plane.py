@@ -115,6 +115,8 @@ def arm_explorer() -> Explorer:
         artists["goal"].set_data(*end[:, None])
         put_name(artists["goal name"], end + _BESIDE * (end - elbow)[::-1] * [1, -1])
         put_name(artists["hand name"], joints[-1] + _BESIDE * (joints[-1] - joints[-2]))
+        # at the goal both names would overlap
+        artists["hand name"].set_text("hand" if np.linalg.norm(end - joints[-1]) > 0.5 else "")
         angles, hand = numbers(np.degrees(q), 1), numbers(joints[-1], 2)
         return {"angles": f"({angles})°", "hand": f"({hand}) m"}
 

@@ -4,10 +4,12 @@ import posixpath
 import re
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import lxml.html
+import numpy as np
 import pytest
 from pages import shown
 from playwright.sync_api import expect
@@ -174,6 +176,24 @@ def test_code_is_folded_until_the_reader_asks_for_it(page):
     expect(code.locator("visible=true")).to_have_count(0)
     page.get_by_role("button", name="Show all code").press("Enter")
     assert code.locator("visible=true").count() > 15
+
+
+def test_columns_of_a_figure_stand_one_below_another_on_a_phone(page):
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.goto((BOOK / "lessons/06_geodesics.html").as_uri())
+    figure = page.locator("figure:has(.column)").first
+    figure.scroll_into_view_if_needed()
+    cuts = [float(x) for x in figure.locator("img").first.get_attribute("data-cuts").split()]
+    boxes = [each.bounding_box() for each in figure.locator(".column").all()]
+    assert len(boxes) == len(cuts) + 1
+    assert max(box["width"] for box in boxes) == figure.bounding_box()["width"]
+    for upper, lower in pairwise(boxes):
+        assert lower["y"] >= upper["y"] + upper["height"] - 1
+    whole = {round(each.bounding_box()["width"]) for each in figure.locator("img").all()}
+    assert len(whole) == 1  # one scale
+    pictures = [each.bounding_box()["x"] for each in figure.locator("img").all()]
+    starts = [box["x"] - left for box, left in zip(boxes, pictures, strict=True)]
+    assert np.allclose(starts, np.array([0, *cuts]) * whole.pop(), atol=1)
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])

@@ -38,12 +38,13 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
 
-  // Shrink formulas that are too wide, but not below 80 %. Formulas that are still too wide can be scrolled, also with keys.
+  // Shrink formulas that are too wide, but not below 80 %, or 66 % on a phone, where letters then have 11 pixels. Formulas that are still too wide can be scrolled, also with keys.
   const fit = () => {
+    const least = matchMedia("(max-width: 46em)").matches ? 66 : 80;
     for (const formula of all('mjx-container[display="true"]')) {
       formula.style.fontSize = "";
       const share = formula.clientWidth / formula.scrollWidth;
-      if (share < 1) formula.style.fontSize = `${Math.max(80, Math.floor(99 * share))}%`;
+      if (share < 1) formula.style.fontSize = `${Math.max(least, Math.floor(99 * share))}%`;
     }
     for (const formula of all('span.math > mjx-container:not([display])')) {
       const room = formula.closest("p, li, td, dd, summary")?.clientWidth;
