@@ -137,7 +137,8 @@ const rbcourseDisplay = {
       const { exact, slider } = row, places = exact.map((x) => Math.abs(x - values[k]));
       [row.now, slider.value] = [values[k], places.indexOf(Math.min(...places))];
     });
-    const player = rows.find(({ plays }) => plays) ?? rows.at(-1), last = player?.slider, button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
+    const player = rows.find(({ plays }) => plays) ?? rows.at(-1), last = player?.slider;
+    const button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
     last?.parentNode?.prepend(button);
     panel.append(table);
     const show = () => {

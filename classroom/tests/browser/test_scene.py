@@ -76,6 +76,7 @@ def put(page, player):
     page.set_viewport_size({"width": 1600, "height": 1300})
     canvas = page.locator("canvas")
     canvas.evaluate("(canvas) => { canvas.style.maxWidth = 'none'; canvas.style.width = '960px'; }")
+    expect(canvas).to_have_attribute("width", "960")  # the drawing has followed
     return canvas
 
 

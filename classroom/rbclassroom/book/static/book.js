@@ -68,7 +68,8 @@ addEventListener("DOMContentLoaded", () => {
   // On a phone, the columns of a figure are shown one below another, at one scale.
   for (const image of matchMedia("(max-width: 46em)").matches ? all("img[data-cuts]") : []) {
     const cuts = [0, ...image.dataset.cuts.split(" ").map(Number), 1], part = document.createElement("span");
-    const sizes = cuts.slice(1).map((end, k) => end - cuts[k]), widest = Math.max(...sizes), [width, height] = image.style.aspectRatio.split("/");
+    const sizes = cuts.slice(1).map((end, k) => end - cuts[k]), widest = Math.max(...sizes);
+    const [width, height] = image.style.aspectRatio.split("/");
     part.append(...sizes.map((size, k) => {
       const column = document.createElement("span"), copy = image.cloneNode();
       column.className = "column";
