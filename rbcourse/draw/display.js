@@ -104,9 +104,9 @@ const rbcourseDisplay = {
     Object.assign(canvas, { role: "img", ariaLabel: text, said });
   },
 
-  // Replace a still picture by a canvas with its own controls. One control, usually the last, plays. The states are recorded, or the
-  // explorer `computed` gets the drawings of its artists, and returns { state, moved, point }: state(values) returns new
-  // drawings and texts; moved(values, k) returns the values after a move of control k, and point(place, values) those
+  // Replace a still picture by a canvas with its own controls. One control, usually the last, plays. The states are
+  // recorded, or the explorer `computed` gets the drawings of its artists, and returns { state, moved, point }:
+  // state(values) returns new drawings and texts; moved(values, k) returns the values after a move of control k, and point(place, values) those
   // after a click at a place, in pixels, or null.
   async revive(image, { size, rooms, background, states, known, controls, milliseconds, computed, parts }) {
     if (image.dataset.read || !window.DecompressionStream) return;
@@ -175,10 +175,14 @@ const rbcourseDisplay = {
     };
     if (explorer?.point) { // a click or a drag in the picture sets the controls
       Object.assign(canvas.style, { cursor: "crosshair", touchAction: "pan-y" }); // a finger can still scroll the page
+      let from = null; // where a finger began, until it moves sideways by 10 pixels; otherwise it taps or scrolls the page
       canvas.onpointerdown = canvas.onpointermove = canvas.onclick = ({ type, buttons, pointerId, pointerType, clientX, clientY }) => {
         if (type !== "click" && !(buttons & 1)) return;
         if (type === "pointerdown") canvas.setPointerCapture(pointerId);
-        if (type === "pointerdown" && pointerType === "touch") return; // perhaps the page scrolls
+        if (type === "pointerdown" && pointerType === "touch") from = clientX;
+        if (type === "pointermove" && Math.abs(clientX - from) > 10) from = null;
+        if (type !== "click" && from !== null) return;
+        from = null;
         const { left, top, width: wide } = canvas.getBoundingClientRect(), scale = size[0] / wide;
         const values = explorer.point([(clientX - left) * scale, (clientY - top) * scale], rows.map(({ now }) => now));
         if (values) [pause(), put(values), show()];

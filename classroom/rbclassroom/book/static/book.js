@@ -38,7 +38,8 @@ addEventListener("DOMContentLoaded", () => {
     }
   };
 
-  // Shrink formulas that are too wide, but not below 80 %, or 66 % on a phone, where letters then have 11 pixels. Formulas that are still too wide can be scrolled, also with keys.
+  // Shrink formulas that are too wide, but not below 80 %, or 66 % on a phone, where letters then have 11 pixels.
+  // Formulas that are still too wide can be scrolled, also with keys.
   const fit = () => {
     const least = matchMedia("(max-width: 46em)").matches ? 66 : 80;
     for (const formula of all('mjx-container[display="true"]')) {
