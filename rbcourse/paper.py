@@ -168,7 +168,8 @@ def figure_5(
 ) -> Drawing:
     """Draw a cube that moves along the optimum (a), or along the projected cubic (b).
 
-    The cube has an edge of 2 m. It is drawn at eight of the 106 times of the data.
+    The cube has an edge of 2 m. Stars mark its centre at eight of the 106 times of the data; at
+    the second and the seventh, no cube is drawn, because it would intersect its neighbours.
     Source: BK Fig. 5.
 
     Parameters
@@ -196,9 +197,8 @@ def figure_5(
     with style():
         fig = plt.figure(figsize=(4.3, 4.5))
         ax: Any = fig.add_subplot(projection="space")
-        bodies.draw_cube_motion(
-            ax, shown, side=2, compared=best(drawn)[2:6] if panel == "b" else ()
-        )
+        compared = best(drawn)[2:6] if panel == "b" else ()
+        bodies.draw_cube_motion(ax, shown, side=2, omitted=(1, 6), compared=compared)
         if panel == "b":
             ax.text(0, 2.6, 9, "orange outlines:\noptimum", color=COLOURS["x"], ha="center")
     said = {

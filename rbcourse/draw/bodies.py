@@ -80,16 +80,22 @@ def _draw_outline(ax: Any, pose: Array, edges: float | Array) -> Faces:
 
 
 def draw_cube_motion(
-    ax: Any, poses: Array, side: float, compared: Sequence[Array] | Array = ()
+    ax: Any,
+    poses: Array,
+    side: float,
+    *,
+    omitted: Sequence[int] = (),
+    compared: Sequence[Array] | Array = (),
 ) -> list[Any]:
     """Draw a cube at each pose, and stars in front of the cubes at their centres.
 
-    The edges of the cubes have the length `side` in m. Behind these cubes, orange outlines show
-    cubes at the poses `compared`. Return the artists of the cubes, and then the stars (BK Fig. 5).
+    The edges of the cubes have the length `side` in m. Poses with the indices `omitted` have a star
+    but no cube. Behind these cubes, orange outlines show cubes at the poses `compared`. Return the
+    artists of the cubes, and then the stars (BK Fig. 5).
     """
     for pose in compared:
         _draw_outline(ax, pose, side).set_zorder(-1)
-    cubes = [draw_box(ax, pose, side) for pose in poses]
+    cubes = [draw_box(ax, pose, side) for i, pose in enumerate(poses) if i not in omitted]
     set_space(ax, poses[:, :3, 3], side, zoom=1.1)
     stars = draw_centre_path(ax, poses[:, :3, 3])
     stars.set_zorder(OVER)
@@ -170,7 +176,7 @@ def describe_cube_motion(poses: Array) -> str:
     steps = np.degrees(angle_between(poses[:-1, :3, :3], poses[1:, :3, :3]))
     ends = " to ".join("(" + ", ".join(f"{x:.3g}" for x in d) + ")" for d in poses[[0, -1], :3, 3])
     return (
-        f"Motion of a cube from {ends} m, drawn at {len(poses)} times. A square marks one of its "
+        f"Motion of a cube from {ends} m, shown at {len(poses)} times. A square marks one of its "
         f"faces, and a star its centre. From one time to the next it turns by "
         f"{', '.join(f'{step:.0f}' for step in steps)} degrees."
     )

@@ -68,7 +68,7 @@ def profiles(curve: Curve, *, body: Body | None = None, **limits: Unpack[Limits]
     for ax, name in zip(axes.flat, shown, strict=False):
         _draw(ax, t, drawn[name], limits.get(name))
         ax.set(ylabel="{}\n({})".format(*_NAMES[name]), xlim=(t[0], t[-1]))
-        ax.set_ylim(bottom=0)
+        ax.set_ylim(0, ax.get_ylim()[1] * (1.12 if limits.get(name) else 1))  # room for "limit"
     for ax in axes.flat[len(shown) :]:
         ax.remove()
     for ax in axes.flat[len(shown) - columns : len(shown)]:  # the last one of each column
@@ -109,3 +109,4 @@ def _draw(ax: Any, t: Array, vectors: Array, limit: Any) -> None:
     ax.plot(t, np.linalg.norm(vectors, axis=1), color=COLOURS["optimum"])
     for highest in most:
         ax.axhline(highest, color=COLOURS["path"], ls="--", lw=1)
+        ax.text(t[0], highest, " limit", color=COLOURS["path"], va="bottom")

@@ -132,7 +132,7 @@ def test_descriptions_state_the_drawn_numbers():
         said += bodies.describe_moving_boxes(TIMES, pair)
     for words in (
         f"geodesic {np.linalg.norm(A1[:3, 3]):.2f} m",
-        "from (0, 0, 0) to (4, 5, 3) m, drawn at 6 times.",
+        "from (0, 0, 0) to (4, 5, 3) m, shown at 6 times.",
         ", ".join([f"{angle / 5:.0f}"] * 5),
         "The orientations of one and two agree at all times.",
         f"upright and bent differ most at t = 0.40, by {50 * bump.max():.0f} degrees.",

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from rbclassroom.figures import FORMS, name_ends, name_lines, named
+from rbclassroom.figures import name_ends, name_lines, named
 from rbcourse import Array
 from rbcourse.draw.save import COLOURS, Table
 
@@ -26,6 +26,8 @@ _LOOKS: dict[str, tuple[str, str]] = {
 }
 _OF_BODY = {"weighted": ("z", "p"), "Bézier": ("reference", "^")}
 """Other looks of curves in figures with the weighted projection, as in the sketches."""
+_SHOWN = "projection", "quaternion", "Bézier"
+"""The curves with a map; the tables have all curves."""
 _OTHER = "path", "."
 """The look of any other curve."""
 _DASHES = ("white", 5, "-"), ("black", 3, "--")
@@ -45,34 +47,53 @@ def groups(data: Table, by: str) -> dict[str, dict[str, Array]]:
 
 
 def draw_atlas(fig: Figure, data: Table, quantile: str) -> None:
-    """Draw a heat map of each closed form, with a colour for each power of ten.
+    """Draw maps of the excess of three closed forms, with a row for each family.
 
-    A dashed line marks 10 %. `data` has the rows of one family of `rbclassroom.atlas.cell_table`.
-    The scale of colours is in the upper right corner, with the name of the `quantile` (BK 1, BK 7).
+    `data` is a table of `rbclassroom.atlas.cell_table`. The scale of colours has the name of the
+    `quantile` (BK 1, BK 7).
     """
-    axes = fig.subplots(2, len(FORMS) // 2 + 1, sharex=True, sharey=True)
-    corner = axes[0, -1]
-    for ax in axes.flat:
-        ax.set_axis_off()
-    for ax, way in zip(axes[axes != corner], FORMS, strict=False):
-        ax.set_axis_on()
-        drawn = heat_map(ax, way, np.asarray(data[f"{way} excess [1]"]))
-    corner.set_title(f"excess, {quantile}")
-    bar = fig.colorbar(drawn, cax=corner.inset_axes((0.3, -0.12, 0.08, 1.12)))
-    label_maps(fig, bar, f", {_family(data)} the axis")
+    rows = {f"{family} the axis": cells for family, cells in groups(data, "family").items()}
+    draw_maps(fig, rows, {f"{way} excess [1]": way for way in _SHOWN}, quantile)
 
 
-def heat_map(ax: Axes, title: str, excess: Array) -> Any:
-    """Draw the excess in each cell of the atlas, and a dashed line at 10 %.
+def draw_maps(
+    fig: Figure, rows: Mapping[str, Table], columns: Mapping[str, str], quantile: str
+) -> None:
+    """Draw a map of the excess for each table and column.
+
+    `rows` maps labels to tables, and `columns` maps names in the tables to headings. A dashed
+    line marks 10 %.
+    """
+    axes = fig.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
+    for row, (label, cells) in zip(axes, rows.items(), strict=True):
+        row[0].set_ylabel(label)
+        for ax, (column, title) in zip(row, columns.items(), strict=True):
+            drawn = _draw_map(ax, np.asarray(cells[column]))
+            ax.set_title(title if ax in axes[0] else "")
+    for ax in axes[-1]:
+        for tick, side in zip(ax.xaxis.get_major_ticks(), ("left", "center", "right"), strict=True):
+            tick.label1.set(ha=side)  # the labels of neighbouring maps stay apart
+    fig.supylabel("end velocity (rad)", fontsize="medium")
+    fig.supxlabel("displacement (°)", fontsize="medium")
+    scale = fig.colorbar(drawn, ax=axes, fraction=0.03, pad=0.02, extend="both")
+    scale.ax.set_title(f"excess,\n{quantile}", loc="left")
+    ticks = sorted({*_LEVELS[::2], _TENTH})
+    scale.set_ticks(ticks, labels=_percents(ticks))
+    scale.ax.minorticks_off()
+    for colour, width, dash in _DASHES:
+        scale.ax.axhline(_TENTH, color=colour, lw=width, ls=dash)
+
+
+def _draw_map(ax: Axes, excess: Array) -> Any:
+    """Draw the excess over displacement and end velocity, with smooth colours between the cells.
 
     If the excess is below all levels everywhere, a text on the map states this.
     """
     cells = round(np.sqrt(len(excess)))
-    turns, speeds = (np.linspace(0, end, cells + 1) for end in (180, 9))
-    x, y = ((edges[1:] + edges[:-1]) / 2 for edges in (turns, speeds))
-    excess = excess.reshape(cells, cells).T
-    norm: Any = BoundaryNorm(_LEVELS, 256, extend="both")
-    drawn = ax.pcolormesh(turns, speeds, excess, norm=norm, cmap="viridis_r")
+    excess = np.pad(excess.reshape(cells, cells).T, 1, "edge")  # up to the edges of the map
+    middles = np.clip(np.arange(-0.5, cells + 1), 0, cells) / cells
+    x, y, norm = 180 * middles, 9 * middles, LogNorm(min(_LEVELS), max(_LEVELS), clip=True)
+    drawn = ax.pcolormesh(x, y, excess, norm=norm, cmap="viridis_r", shading="gouraud")
     if np.nanmin(excess) < _TENTH < np.nanmax(excess):
         powers = np.log10(np.maximum(excess, min(_LEVELS)))
         for colour, width, dash in _DASHES:
@@ -81,36 +102,22 @@ def heat_map(ax: Axes, title: str, excess: Array) -> Any:
     if np.max(excess) < min(_LEVELS):
         said = f"< {_percents(_LEVELS)[0]}\neverywhere"
         ax.text(0.5, 0.5, said, transform=ax.transAxes, ha="center", va="center")
-    ax.set(title=title, xticks=[0, 90, 180], yticks=[0, 3, 6, 9])
-    for tick, side in zip(ax.xaxis.get_major_ticks(), ("left", "center", "right"), strict=True):
-        tick.label1.set(ha=side)  # the labels of neighbouring maps stay apart
+    ax.set(xticks=[0, 90, 180], yticks=[0, 3, 6, 9])
     return drawn
-
-
-def label_maps(fig: Figure, bar: Any, ways: str = "") -> None:
-    """Write the labels of the axes of heat maps, and of their scale of colours."""
-    fig.supylabel(f"end velocity{ways} (rad)", fontsize="medium")
-    fig.supxlabel("displacement (°)", fontsize="medium")
-    levels = sorted({*_LEVELS[::2], _TENTH})
-    bar.set_ticks(levels, labels=_percents(levels))
-    for colour, width, dash in _DASHES:
-        bar.ax.axhline(_TENTH, color=colour, lw=width, ls=dash)
 
 
 def describe_atlas(data: Table, quantile: str) -> str:
     """Return a description of the figure of `draw_atlas`."""
-    levels = 0.01, _TENTH, 1
-    said = "; ".join(f"{way} {shares(data[f'{way} excess [1]'], levels)}" for way in FORMS)
+    levels, said = (0.01, _TENTH, 1), []
+    for family, cells in groups(data, "family").items():
+        each = (f"{way} {shares(cells[f'{way} excess [1]'], levels)}" for way in _SHOWN)
+        said.append(f"{family} the axis: {'; '.join(each)}")
     return (
-        f"Cost of closed forms over the optimum minus 1, {quantile}, for end velocities "
-        f"{_family(data)} the axis of the displacement. In each heat map, to the "
-        "right the displacement grows from 0 to 180 degrees, and upwards the end velocity from 0 "
-        f"to 9 rad. Share of the cells below 1, 10 and 100 %, in percent: {said}."
+        f"Cost of closed forms over the optimum minus 1, {quantile}, for end velocities along the "
+        "axis of the displacement (upper row) and across it (lower row). In each map, to the right "
+        "the displacement grows from 0 to 180 degrees, and upwards the end velocity from 0 to 9 "
+        f"rad. Share of the cells below 1, 10 and 100 %, in percent: {'. '.join(said)}."
     )
-
-
-def _family(data: Table) -> str:
-    return str(np.asarray(data["family"])[0])
 
 
 def shares(excess: Any, levels: Sequence[float] = (_TENTH,)) -> str:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rbclassroom.figures import columns, name_ends, name_lines, vectors
-from rbclassroom.figures.lesson12 import groups, heat_map, label_maps, shares
+from rbclassroom.figures.lesson12 import draw_maps, groups, shares
 from rbcourse import Array, Body, Curve, log_so3
 from rbcourse.closed_forms import normal_cubic
 from rbcourse.connection import geodesic_flow
@@ -20,6 +20,12 @@ LOOKS: dict[str, dict[str, Any]] = {
     "least torque": {"color": COLOURS["screw"], "ls": "--"},
 }
 """Three motions of a body, and the styles of their lines; no colour is that of an axis."""
+_MAPPED = {
+    "weighted": "weighted\nprojection",
+    "two Béziers": "cheaper of\ntwo Béziers",
+    "normal": "normal\ncubic",
+}
+"""The curves with a map, by their names in the stored table; the table has more curves."""
 _SPEEDS = {"least jerk": ("optimum", "-"), "projected quintic": ("projection", "--")}
 
 
@@ -151,33 +157,25 @@ def _by_kind(data: Table) -> dict[str, list[Array]]:
     return found
 
 
-def draw_body_atlas(fig: Figure, data: Table, curves: Mapping[str, str]) -> None:
-    """Draw heat maps of medians, with a row for each body and a column for each curve.
+def draw_body_atlas(fig: Figure, data: Table, bodies: Sequence[str]) -> None:
+    """Draw maps of medians, with a row for each body and a column for each curve of `_MAPPED`.
 
-    `data` has rows of the stored table "maps" of `rbclassroom.atlas`. `curves` maps names of curves
-    in this table to headings of the figure (beyond BK 3).
+    `data` is the stored table "maps" of `rbclassroom.atlas` (beyond BK 3).
     """
-    bodies = groups(data, "body")
-    axes = fig.subplots(len(bodies), len(curves), sharex=True, sharey=True, squeeze=False)
-    for row, (body, cells) in zip(axes, bodies.items(), strict=True):
-        row[0].set_ylabel(body if len(bodies) > 1 else "")
-        for ax, (curve, title) in zip(row, curves.items(), strict=True):
-            drawn = heat_map(ax, title if ax in axes[0] else "", cells[f"{curve} median [1]"])
-    bar = fig.colorbar(drawn, ax=axes, fraction=0.025, pad=0.02)
-    bar.ax.set_title("median\nexcess", loc="left")
-    label_maps(fig, bar)
+    cells = groups(data, "body")
+    columns = {f"{curve} median [1]": title for curve, title in _MAPPED.items()}
+    draw_maps(fig, {body: cells[body] for body in bodies}, columns, "median")
 
 
-def describe_body_atlas(data: Table, curves: Mapping[str, str]) -> str:
+def describe_body_atlas(data: Table, bodies: Sequence[str]) -> str:
     """Return a description of the figure of `draw_body_atlas`."""
-    titles, said = {x: title.replace("\n", " ") for x, title in curves.items()}, []
-    for body, cells in groups(data, "body").items():
-        each = (f"{title} {shares(cells[f'{x} median [1]'])}" for x, title in titles.items())
-        said.append(f"{body}: {', '.join(each)}")
-    rows = "a row for each body and " if len(said) > 1 else ""
+    cells, said = groups(data, "body"), []
+    for body in bodies:
+        each = (f"{title} {shares(cells[body][f'{x} median [1]'])}" for x, title in _MAPPED.items())
+        said.append(f"{body}: {', '.join(each)}".replace("\n", " "))
     return (
-        f"Median of the cost over the optimum minus 1, with {rows}a column for each curve. In each "
-        "heat map, to the right the displacement grows from 0 to 180 degrees, and upwards the end "
-        "velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
+        "Median of the cost over the optimum minus 1, with a row for each body and a column for "
+        "each curve. In each map, to the right the displacement grows from 0 to 180 degrees, and "
+        "upwards the end velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
         f"{'; '.join(said)}."
     )

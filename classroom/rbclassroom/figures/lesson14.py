@@ -130,7 +130,7 @@ def draw_turns(axes: Sequence[Axes], data: Table) -> None:
     for clock, angle in zip(_CLOCK, _ANGLES, strict=True):
         dots = angle + 2 * np.pi * np.arange(-20, 20)
         dots = dots[(dots > low) & (dots < high)]
-        axes[0].plot(np.full(len(dots), clock), dots, "o", color=PALE, ms=4, zorder=0)
+        axes[0].plot(np.full(len(dots), clock), dots, "o", color=PALE, ms=2, zorder=0)
     for (name, bend), look in zip(named(" bend [rad]", data).items(), _TURNS, strict=True):
         for ax, values in zip(axes, (data[f"{name} [rad]"], bend), strict=True):
             ax.plot(t, values, label=name, **look)

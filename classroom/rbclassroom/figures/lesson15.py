@@ -1,5 +1,6 @@
 """Lesson 15: the phase plane of a path, the two passes, and the use of each limit."""
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
@@ -24,12 +25,6 @@ _LOOKS: dict[str, dict[str, Any]] = {
     "speeds": {"color": COLOURS["z"], "ls": "-.", "label": "limit of speeds"},
     "one rate": {"color": COLOURS["reference"], "ls": "--"},
     "fastest": {"color": COLOURS["optimum"], "lw": 2.5},
-}
-_SHARES: dict[str, dict[str, Any]] = {
-    "angular_speed": {"color": COLOURS["z"], "ls": "-."},
-    "speed": {"color": COLOURS["y"], "ls": "-"},
-    "angular_acceleration": {"color": COLOURS["projection"], "ls": ":"},
-    "acceleration": {"color": COLOURS["x"], "ls": "--"},
 }
 
 
@@ -126,15 +121,18 @@ def share_table(motion: Curve, limits: dict[str, float]) -> Table:
     }
 
 
-def draw_shares(ax: Axes, data: Table) -> None:
-    """Draw a `share_table`."""
+def draw_shares(axes: Sequence[Axes], data: Table) -> None:
+    """Draw each share of a `share_table` on its own axes; it is coloured while it is 1."""
     t = np.asarray(data["t [s]"])
-    for label, share in named(" [1]", data).items():
-        ax.plot(t, share, label=label, **_SHARES[label.replace(" ", "_")])
-    ax.axhline(1, color=PALE, lw=1, zorder=0)
-    ax.set(xlabel="time (s)", ylabel="share of the limit", ylim=(0, 1.02), xlim=(t[0], t[-1]))
-    ax.set_yticks([0, 0.5, 1], ["0", "0.5", "1"])
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, columnspacing=1.2)
+    for ax, (label, share) in zip(axes, named(" [1]", data).items(), strict=True):
+        ax.fill_between(t, share, color=PALE, lw=0, alpha=0.4)
+        used = ax.fill_between(t, share, where=share > 0.99, color=COLOURS["x"], lw=0)
+        ax.plot(t, share, color=COLOURS["optimum"], lw=1.2, label=label)
+        ax.set(ylim=(0, 1.05), yticks=[0, 1], xlim=(t[0], t[-1]))
+        ax.set_ylabel(label.replace(" ", "\n"), rotation=0, ha="right", va="center")
+        ax.label_outer()
+    axes[-1].set_xlabel("time (s)")
+    axes[0].figure.legend([used], ["at the limit"], loc="outside upper right")
 
 
 def describe_shares(data: Table) -> str:

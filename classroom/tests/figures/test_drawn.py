@@ -194,35 +194,41 @@ def test_heat_maps_show_each_cell_at_its_place_and_a_line_at_10_percent():
     fig = Figure(figsize=(9, 6))
     lesson12.draw_atlas(fig, data, "median")
     maps = {ax.get_title(): ax for ax in fig.axes if ax.get_title() in FORMS}
+    assert list(maps) == ["projection", "quaternion", "Bézier"]
     for way, ax in maps.items():
-        edges = np.asarray(ax.collections[0].get_coordinates())
-        assert edges[0, :, 0] == pytest.approx(np.arange(0, 181, 18))
-        assert edges[:, 0, 1] == pytest.approx(np.arange(0, 9.1, 0.9))
+        places = np.asarray(ax.collections[0].get_coordinates())
+        assert places[0, :, 0] == pytest.approx([0, *np.arange(9, 180, 18), 180])
+        assert places[:, 0, 1] == pytest.approx([0, *np.arange(0.45, 9, 0.9), 9])
         shown = ax.collections[0].get_array()
-        assert np.array_equal(shown, data[f"{way} excess [1]"].reshape(10, 10).T)
+        assert np.array_equal(shown[1:-1, 1:-1], data[f"{way} excess [1]"].reshape(10, 10).T)
+        assert np.array_equal(shown[:, [0, -1]], shown[:, [1, -2]])  # up to the edges
+        assert np.array_equal(shown[[0, -1]], shown[[1, -2]])
         assert bool(ax.texts) == (way == "Bézier")  # "< 0.01 % everywhere"
     for line in maps["projection"].collections[1:]:
         drawn = np.concatenate(line.get_paths()[0].to_polygons(closed_only=False))
         assert drawn[:, 0] == pytest.approx(np.interp(-1, slope, np.arange(9, 180, 18)))
     said = lesson12.describe_atlas(data, "median")
-    assert "along the axis of the displacement" in said
-    assert "Bézier 100, 100, 100; corrected 30, 50, 70;" in said
+    assert "along the axis: projection 30, 50, 70; quaternion 30, 50, 70; Bézier 100," in said
 
 
 def test_rows_of_maps_are_bodies_and_columns_are_curves():
-    names = {"one": "curve\none", "two": "another"}
-    excess = np.random.default_rng(2).random((2, 2, 100))
+    names, excess = (
+        ("weighted", "two Béziers", "normal"),
+        np.random.default_rng(2).random((2, 3, 100)),
+    )
     data = {"body": np.repeat(["ball", "book"], 100)}
     data |= {f"{x} median [1]": excess[:, k].ravel() for k, x in enumerate(names)}
     fig = Figure(figsize=(9, 6))
-    lesson13.draw_body_atlas(fig, data, names)
+    lesson13.draw_body_atlas(fig, data, ["book", "ball"])
     *maps, _ = fig.axes
-    assert [ax.get_title() for ax in maps[:2]] == ["curve\none", "another"]
-    assert [ax.get_ylabel() for ax in maps[::2]] == ["ball", "book"]
-    for ax, wanted in zip(maps, excess.reshape(4, 10, 10), strict=True):
-        assert np.array_equal(ax.collections[0].get_array(), wanted.T)
+    titles = [ax.get_title() for ax in maps[:3]]
+    assert titles == ["weighted\nprojection", "cheaper of\ntwo Béziers", "normal\ncubic"]
+    assert [ax.get_ylabel() for ax in maps[::3]] == ["book", "ball"]
+    for ax, wanted in zip(maps, excess[::-1].reshape(6, 10, 10), strict=True):
+        assert np.array_equal(ax.collections[0].get_array()[1:-1, 1:-1], wanted.T)
     share = 100 * np.mean(excess[1, 0] < 0.1)
-    assert f"book: curve one {share:.0f}," in lesson13.describe_body_atlas(data, names)
+    said = lesson13.describe_body_atlas(data, ["book"])
+    assert f"book: weighted projection {share:.0f}, cheaper of" in said
 
 
 def test_profiles_show_the_times_of_poses():
