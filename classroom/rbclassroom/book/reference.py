@@ -152,7 +152,10 @@ def coloured(source: str) -> str:
         (next((kind for kind in (Comment, Keyword, String) if found in kind), Token), text)
         for found, text in PythonLexer(stripnl=False).get_tokens(source)
     )
-    lines = formatted(tokens, HtmlFormatter(nowrap=True)).split("\n")
+    html = formatted(tokens, HtmlFormatter(nowrap=True))
+    for kind, tag in {"k": "b", "s": "i", "c": "em"}.items():  # the pages are a fifth smaller
+        html = re.sub(rf'<span class="{kind}">(.*?)</span>', rf"<{tag}>\1</{tag}>", html)
+    lines = html.split("\n")
     for name, _, node in _definitions(ast.parse(source)):
         lines[node.lineno - 1] = f'<a id="{name}"></a>{lines[node.lineno - 1]}'
     return "\n".join(lines)

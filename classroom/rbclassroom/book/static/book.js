@@ -118,15 +118,22 @@ addEventListener("DOMContentLoaded", () => {
   const results = document.querySelector("#search-results");
   if (!results) return;
   const words = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase().split(/\s+/).filter(Boolean);
+  let texts = {};
   const tell = () => {
     for (const link of all("li:not(:has(.excerpt)) > a", results)) {
-      const name = link.getAttribute("href").replace(/\.html.*/, ""), text = window.texts?.[name] ?? "";
+      const name = link.getAttribute("href").replace(/\.html.*/, ""), text = texts[name] ?? "";
       const at = Math.max(0, text.toLowerCase().indexOf(words[0])), from = at < 60 ? 0 : text.indexOf(" ", at - 60) + 1;
       const said = `${from ? "… " : ""}${text.slice(from, text.indexOf(" ", from + 180))} …`;
       if (text) link.after(Object.assign(document.createElement("p"), { className: "excerpt", textContent: said }));
     }
   };
-  document.head.append(Object.assign(document.createElement("script"), { src: "_static/texts.js", onload: tell }));
+  window.showExcerpts = async (packed) => {
+    const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+    const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    texts = await new Response(plain).json();
+    tell();
+  };
+  document.head.append(Object.assign(document.createElement("script"), { src: "_static/texts.js" }));
   new MutationObserver(tell).observe(results, { childList: true, subtree: true });
 });
 
