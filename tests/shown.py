@@ -34,7 +34,7 @@ SHARES = {
     r"lesson08_half, turn \[rad\]": 0,  # the body is turned by this angle
     r"lesson0[78]_ways, .* R\d\d \[1\]": 0,  # only the frames at the ends are drawn
     # the place of the cell in the map shows both values
-    r"lesson1[23]_(median|ninety|atlas), (displacement|end velocity) .*": 0,
+    r"lesson1[23]_(median|ninety|cheaper|atlas), (displacement|end velocity) .*": 0,
     # three curves have maps; the ball and the book, but not the brick
     r"lesson12_(median|ninety), (exponential|corrected|cumulative|Cayley) excess .*": 0,
     r"lesson13_atlas, three median .*": 0,

@@ -30,7 +30,7 @@ export default {
       button.textContent = letter;
       button.onclick = () => {
         buttons.forEach((each) => {
-          each.classList.toggle("mod-info", each === button);
+          each.classList.toggle("mod-active", each === button);
           each.setAttribute("aria-pressed", each === button);
         });
         said.textContent = open(el) ? "" : " The answer is below.";

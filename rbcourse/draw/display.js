@@ -118,7 +118,7 @@ const rbcourseDisplay = {
     const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
     const width = `width: ${size[0]}px; max-width: 100%`;
     const canvas = make("canvas", { style: `display: block; ${width}`, role: "img", ariaLabel: image.alt });
-    const panel = make("div", { style: width }), table = make("div", {});
+    const panel = make("div", { style: width }), table = make("div", { className: "rbcourse-numbers" });
     const rows = controls.map(({ label, values, first, plays }, number) => {
       const max = values.length - 1, exact = values.map((text) => parseFloat(text.replace("−", "-")));
       const row = make("div", { style: "display: flex; gap: 0.6em; margin: 0.3em 0" });
@@ -130,7 +130,7 @@ const rbcourseDisplay = {
       if (words.length) Object.assign(row, { className: "rbcourse-choice", role: "group", ariaLabel: label });
       row.append(label, ...(words.length ? buttons : [slider, output]));
       if (max) panel.append(row); // a control with one value is fixed
-      return { slider, values, output, buttons, plays, exact, now: exact[first] };
+      return { slider, values, output, buttons, plays, exact, first, now: exact[first] };
     });
     const explorer = rbcourseDisplay.explorers[computed]?.(parts, drawn.map((each) => rbcourseDisplay.decode(each, styles)));
     const put = (values) => rows.forEach((row, k) => {
@@ -140,7 +140,12 @@ const rbcourseDisplay = {
     const player = rows.find(({ plays }) => plays) ?? rows.at(-1), last = player?.slider;
     const button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
     last?.parentNode?.prepend(button);
-    panel.append(table);
+    const start = () => {
+      pause();
+      for (const row of rows) [row.slider.value, row.now] = [row.first, row.exact[row.first]];
+      show();
+    };
+    panel.append(table, ...(rows.length ? [make("button", { className: "rbcourse-reset", textContent: "Reset", onclick: start })] : []));
     const show = () => {
       let k = 0;
       for (const { slider, values, output, buttons } of rows) {

@@ -155,7 +155,7 @@ const rbcourseScene = {
     });
     for (const [name, onclick] of [
       ["front", () => to(all([-90, 0]))], ["side", () => to(all([0, 0]))], ["top", () => to(all([-90, 90]))],
-      ["↑", () => by(0, 15)], ["↓", () => by(0, -15)], ["as printed", () => to(first)], ["save picture", save],
+      ["↑", () => by(0, 15)], ["↓", () => by(0, -15)], ["first view", () => to(first)], ["save picture", save],
     ]) row.append(make("button", { type: "button", textContent: name, onclick, style: "font: inherit" }));
     row.append(said);
     const steps = { ArrowLeft: [-5, 0], ArrowRight: [5, 0], ArrowUp: [0, 5], ArrowDown: [0, -5] };
@@ -182,7 +182,7 @@ const rbcourseScene = {
     }
     canvas.tabIndex = 0;
     Object.assign(canvas.style, { cursor: "grab", touchAction: "pan-y pinch-zoom" });
-    canvas.title = "Drag, or press the arrow keys, to turn; Home: as printed";
+    canvas.title = "Drag, or press the arrow keys, to turn; Home: first view";
     set(first);
     return row;
   },

@@ -285,7 +285,8 @@ def build(root: Path, book: Path, repository: str = "", pyodide: Path | None = N
             env={**os.environ, "PYTHONHASHSEED": "0", "RBCOURSE_BOOK_EXTRA": str(extra)},
             check=True,
         )
-        (pages / ".buildinfo").unlink()
+        for needless in (pages / ".buildinfo", *pages.rglob("*.map")):
+            needless.unlink()
         (pages / "_sources").rmdir()
         (pages / ".nojekyll").touch()  # without this file, GitHub Pages omits _static
         made = sorted(path.relative_to(pages) for path in pages.rglob("*") if path.is_file())

@@ -29,6 +29,7 @@ numpydoc_show_class_members = False
 toc_object_entries = False  # if true, the navigation of each page lists all objects
 
 html_theme = "furo"
+html_domain_indices = False
 html_static_path = ["static"]
 html_css_files = ["book.css"]
 html_js_files = ["book.js"]

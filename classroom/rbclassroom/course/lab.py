@@ -18,9 +18,10 @@ OVERRIDES = {
     "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
     "@jupyterlab/filebrowser-extension:browser": {"showLastModifiedColumn": False},
 }
-DARK = """[data-jp-theme-light="false"] :is(figure, .rbcourse-explorer) :is(img, canvas) {
+STYLE = """[data-jp-theme-light="false"] :is(figure, .rbcourse-explorer) :is(img, canvas) {
   filter: invert(0.93) hue-rotate(180deg);
 }
+.jp-Notebook .jp-RenderedMarkdown :is(p, ul, ol, blockquote, details) { max-width: 50em; }
 """
 STILLS = """from rbclassroom.course.notebooks import before_saving
 get_config().ContentsManager.pre_save_hook = before_saving
@@ -54,7 +55,7 @@ def configure() -> Path:
     _write(folder / "jupyter_server_config.json", settings)
     replace_file(folder / "jupyter_server_config.py", STILLS.encode())
     (folder / "custom").mkdir(exist_ok=True)
-    replace_file(folder / "custom" / "custom.css", DARK.encode())
+    replace_file(folder / "custom" / "custom.css", STYLE.encode())
     return folder
 
 

@@ -135,6 +135,7 @@ rbcourseDisplay.computed = (() => {
     },
     // A goal moves the arm to it. A click or a drag sets the goal; the elbow stays on its side.
     moved: (values, k) => (k < 2 ? [values[0], values[1], 1] : values),
+    on: "links",
     point(place, [, theta1]) {
       const found = math.arm_inverse_kinematics(place, links);
       return found && [...found[theta1 >= 0 ? 0 : 1].map(degrees), 1];
@@ -143,6 +144,9 @@ rbcourseDisplay.computed = (() => {
 
   const theta = {
     title: "The line and its shadow",
+    // A click or a drag moves the point on the line.
+    on: "line",
+    point: ([x], [angle]) => [angle, Math.max(0, Math.min(1, 0.5 + x / (2 * sin(radians(angle) / 2))))],
     show([angle, t]) {
       const a = radians(angle), on = (share) => [cos(PI / 2 + a / 2 - a * share), sin(PI / 2 + a / 2 - a * share)];
       const now = math.theta(t, a), [first, last] = [on(0), on(1)], times = range(101).map((k) => k / 100);
@@ -338,7 +342,7 @@ rbcourseDisplay.computed = (() => {
   }
 
   // Return an explorer for display.js. A part has the map from its axes to pixels; a name moves from its anchor.
-  const placed = ({ title, show, moved, point }) => (parts, drawings) => ({
+  const placed = ({ title, show, moved, on, point }) => (parts, drawings) => ({
     state(values) {
       const { points, said } = show(values);
       const all = parts.flatMap(({ name, axes, anchor, colours }, i) => {
@@ -357,7 +361,7 @@ rbcourseDisplay.computed = (() => {
     },
     moved,
     point: point && (([x, y], values) => {
-      const [sx, x0, sy, y0] = parts.at(-1).axes;
+      const [sx, x0, sy, y0] = parts.find(({ name }) => name === on).axes;
       return point([(x - x0) / sx, (y - y0) / sy], values);
     }),
   });

@@ -29,7 +29,8 @@ def theta_explorer() -> Explorer:
 
     The left picture shows the circle of the rotations between the two ends, with the chord; the
     right picture shows θ against time. The controls are the ``angle`` a in degrees, and the time
-    ``t``, which the play button moves (BK Prop. 6, BK (15), BK (16), BK Cor. 1, BK Fig. 2).
+    ``t``, which the play button moves, or a click on the left picture (BK Prop. 6, BK (15), BK
+    (16), BK Cor. 1, BK Fig. 2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.58, 0.82))
@@ -80,7 +81,12 @@ def theta_explorer() -> Explorer:
         said["s(t), of the line"] = line_singular_value(t, a)
         return {name: f"{value:.3f}" for name, value in said.items()}
 
-    return Explorer("The line and its shadow", fig, artists, controls, show, plays="t")
+    def point(x: float, y: float) -> dict[str, float]:
+        across, _ = ax.transData.inverted().transform((x, y))
+        half = np.sin(np.radians(controls["angle"].value) / 2)
+        return {"t": round(float(np.clip(0.5 + across / (2 * half), 0, 1)), 2)}
+
+    return Explorer("The line and its shadow", fig, artists, controls, show, plays="t", point=point)
 
 
 def screw_explorer() -> Explorer:

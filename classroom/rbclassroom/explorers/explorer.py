@@ -117,11 +117,11 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
         wide = {"flex": f"2 1 {self.display.width}px", "min_width": "0", "max_width": most}
         self.picture = Canvas(made=made, layout=wide)
         panel = ipywidgets.VBox(
-            [ipywidgets.HBox([self.play, self.reset]), *self.controls.values(), said],
+            [ipywidgets.HBox([self.play, self.reset]), self.time, *others, said],
             layout={"flex": "1 1 19em", "min_width": "0"},
         )
         panel.add_class("rbcourse-panel")
-        flow = {"flex_flow": "row wrap", "align_items": "flex-start"}
+        flow = {"flex_flow": "row wrap", "align_items": "flex-start", "grid_gap": "8px 16px"}
         super().__init__([self.picture, panel], layout=flow)
         self.add_class("rbcourse-explorer")
         self._follow()

@@ -50,8 +50,8 @@ def minimum_acceleration_explorer() -> Explorer:
         for way in ("optimum", "rival"):
             artists[f"{way} box"] = draw_box(space, np.eye(4), _BOX)
         artists["rival box"].set(edgecolor=COLOURS["projection"], **_OUTLINE)
-        fig.text(0.83, 0.88, "optimum, full lines", ha="center")
-        fig.text(0.83, 0.15, "closed form, dashed", ha="center", color=COLOURS["projection"])
+        fig.text(0.83, 0.88, "optimum: full lines", ha="center")
+        fig.text(0.8, 0.15, "closed form: dashed, pink", ha="center", color=COLOURS["projection"])
     controls = {
         "rival": widgets.menu("closed form", list(FORMS)),
         "size": widgets.slider("size s (1: paper's)", 1.0, 0.05, 1.5, 0.05),

@@ -1,6 +1,6 @@
 """Lesson 12: heat maps of the atlas, and the excess over the excursion or the margin."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from rbclassroom.figures import name_ends, name_lines, named
 from rbcourse import Array
-from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.save import COLOURS, PALE, Table
 
 _TENTH = 0.1
 _LEVELS = [1e-4, 1e-3, 0.01, _TENTH, 1.0, 10.0, 100.0]
@@ -26,8 +26,10 @@ _LOOKS: dict[str, tuple[str, str]] = {
 }
 _OF_BODY = {"weighted": ("z", "p"), "Bézier": ("reference", "^")}
 """Other looks of curves in figures with the weighted projection, as in the sketches."""
-_SHOWN = "projection", "quaternion", "Bézier"
+SHOWN = "projection", "quaternion", "Bézier"
 """The curves with a map; the tables have all curves."""
+_BEHIND = "quaternion", "Cayley"
+"""Curves that are grey in the figure of the growth, because they end where others do."""
 _OTHER = "path", "."
 """The look of any other curve."""
 _DASHES = ("white", 5, "-"), ("black", 3, "--")
@@ -46,14 +48,14 @@ def groups(data: Table, by: str) -> dict[str, dict[str, Array]]:
     }
 
 
-def draw_atlas(fig: Figure, data: Table, quantile: str) -> None:
-    """Draw maps of the excess of three closed forms, with a row for each family.
+def draw_atlas(fig: Figure, data: Table, quantile: str, ways: Iterable[str] = SHOWN) -> None:
+    """Draw maps of the excess of some curves, with a row for each family.
 
     `data` is a table of `rbclassroom.atlas.cell_table`. The scale of colours has the name of the
     `quantile` (BK 1, BK 7).
     """
     rows = {f"{family} the axis": cells for family, cells in groups(data, "family").items()}
-    draw_maps(fig, rows, {f"{way} excess [1]": way for way in _SHOWN}, quantile)
+    draw_maps(fig, rows, {f"{way} excess [1]": way for way in ways}, quantile)
 
 
 def draw_maps(
@@ -106,17 +108,17 @@ def _draw_map(ax: Axes, excess: Array) -> Any:
     return drawn
 
 
-def describe_atlas(data: Table, quantile: str) -> str:
+def describe_atlas(data: Table, quantile: str, ways: Iterable[str] = SHOWN) -> str:
     """Return a description of the figure of `draw_atlas`."""
     levels, said = (0.01, _TENTH, 1), []
     for family, cells in groups(data, "family").items():
-        each = (f"{way} {shares(cells[f'{way} excess [1]'], levels)}" for way in _SHOWN)
+        each = (f"{way} {shares(cells[f'{way} excess [1]'], levels)}" for way in ways)
         said.append(f"{family} the axis: {'; '.join(each)}")
     return (
         f"Cost of closed forms over the optimum minus 1, {quantile}, for end velocities along the "
-        "axis of the displacement (upper row) and across it (lower row). In each map, to the right "
-        "the displacement grows from 0 to 180 degrees, and upwards the end velocity from 0 to 9 "
-        f"rad. Share of the cells below 1, 10 and 100 %, in percent: {'. '.join(said)}."
+        "axis of the displacement (upper row) and across it (lower row). In each heat map, to the "
+        "right the displacement grows from 0 to 180 degrees, and upwards the end velocity from 0 "
+        f"to 9 rad. Share of the cells below 1, 10 and 100 %, in percent: {'. '.join(said)}."
     )
 
 
@@ -135,17 +137,22 @@ def draw_growth(ax: Axes, data: Table, slopes: Mapping[int, float]) -> None:
     looks = _LOOKS | (_OF_BODY if "weighted" in medians else {})
     for way, median in medians.items():
         colour, mark = looks.get(way, _OTHER)
-        ax.plot(size, median, "-", marker=mark, ms=8, label=way, color=COLOURS[colour])
+        named_line: Any = {"marker": mark, "ms": 8, "label": way, "color": COLOURS[colour]}
+        grey: Any = {"lw": 1, "label": f"_{way}", "color": PALE, "zorder": 1}
+        ax.plot(size, median, "-", **(grey if way in _BEHIND else named_line))
     ax.set(xscale="log", yscale="log", ymargin=0.1, xlabel="size $s$ of the excursion (rad)")
-    x, grey = np.array([size[0], 0.5, 1]), COLOURS["reference"]
+    x, ink = np.array([size[0], 0.5, 1]), COLOURS["reference"]
     for slope, low in slopes.items():
         y = low * (x / x[0]) ** slope
-        ax.plot(x, y, ":", lw=1.5, color=grey)
+        ax.plot(x, y, ":", lw=1.5, color=ink)
         above = low > max(median[0] for median in medians.values())
         ha, va = ("right", "bottom") if above else ("left", "top")
-        ax.text(x[1], y[1], f" slope {slope} ", color=grey, ha=ha, va=va)
+        ax.text(x[1], y[1], f" slope {slope} ", color=ink, ha=ha, va=va)
     ax.set_xticks(size, [f"{s:g}" for s in size], minor=False)
     ax.minorticks_off()
+    if any(way in medians for way in _BEHIND):
+        said = f"grey: {' and '.join(_BEHIND)}"
+        ax.text(0.98, 0.03, said, color="0.4", ha="right", transform=ax.transAxes)
     lowest = min(np.nanmin(median) for median in medians.values())
     _set_percents(ax, [x for x in [1e-12, 1e-10, 1e-8, 1e-6, *_LEVELS[::2]] if x > lowest / 30])
     name_ends(ax, 0.085)

@@ -175,7 +175,7 @@ def describe_body_atlas(data: Table, bodies: Sequence[str]) -> str:
         said.append(f"{body}: {', '.join(each)}".replace("\n", " "))
     return (
         "Median of the cost over the optimum minus 1, with a row for each body and a column for "
-        "each curve. In each map, to the right the displacement grows from 0 to 180 degrees, and "
-        "upwards the end velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
+        "each curve. In each heat map, to the right the displacement grows from 0 to 180 degrees, "
+        "and upwards the end velocity from 0 to 9 rad. Share of the cells below 10 %, in percent: "
         f"{'; '.join(said)}."
     )

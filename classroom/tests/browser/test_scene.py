@@ -153,7 +153,7 @@ def test_buttons_and_keys_set_the_view(timed, tmp_path):
     for key in ("Home", "ArrowRight", "ArrowDown"):
         canvas.press(key)
     expect(view).to_have_text(told((13, -27)))
-    timed.get_by_role("button", name="as printed").click()
+    timed.get_by_role("button", name="first view").click()
     expect(view).to_have_text(first)
     assert shown(canvas) == seen[first]
     time.press("End")  # the view is kept while time runs

@@ -136,7 +136,7 @@ def test_a_refused_click_states_the_reason(explorer):
         assert explorer.values == {"x": 4.0, "kind": "high"}
         explorer.put()
         assert notice(explorer) == ""
-    shown = [each.picture.made["clickable"] for each in (explorer, made("arm"), made("theta"))]
+    shown = [each.picture.made["clickable"] for each in (explorer, made("arm"), made("planar"))]
     assert shown == [True, True, False]
 
 

@@ -55,6 +55,13 @@ addEventListener("DOMContentLoaded", () => {
       if (each.scrollWidth > each.clientWidth + 1) each.tabIndex = 0;
     }
   };
+  // On a phone, each row of a table that is too wide is a card.
+  for (const table of matchMedia("(max-width: 46em)").matches ? all(".content table:not(.ledger, figure *)") : []) {
+    const names = all("thead th", table).map((cell) => cell.textContent);
+    if (table.scrollWidth <= table.clientWidth + 1 || names.length > 4) continue;
+    table.classList.add("narrow");
+    for (const row of all("tbody tr", table)) all("td", row).forEach((cell, k) => { if (k && names[k]) cell.dataset.name = names[k]; });
+  }
   addEventListener("load", () => Promise.resolve(window.MathJax?.startup?.promise).then(join).then(fit));
   addEventListener("resize", fit);
   addEventListener("toggle", fit, { capture: true }); // a folded element was opened or closed

@@ -11,7 +11,7 @@ Object.defineProperty(window, "pixels", { get: () => window.devicePixelRatio * R
 const fit = (figure) => {
   const seen = figure.querySelector(":scope > :is(canvas, img)"), body = figure.closest(".body");
   if (!seen || !figure.clientWidth) return;
-  const numbers = body.querySelector(".panel > div:not(:has(> input), .rbcourse-choice)"); // they stand below the picture if they need the room
+  const numbers = body.querySelector(".panel > .rbcourse-numbers"); // they stand below the picture if they need the room
   if (numbers && body.querySelector(".words").offsetHeight + 34 > body.clientHeight) figure.append(numbers);
   const below = all(":scope > div", figure).reduce((sum, { offsetHeight }) => sum + offsetHeight, 0);
   figure.dataset.crop ??= seen.dataset.crop;
@@ -60,7 +60,7 @@ const revive = async (section) => {
   await rbcourseDisplay.revive(figure.querySelector("img"), data);
   if (section.matches(".split")) { // sliders and numbers stand below the text, so that the picture is large
     const panel = Object.assign(document.createElement("div"), { className: "panel" });
-    panel.append(...all(":scope > div > div:is(:has(> input), .rbcourse-choice, :last-child)", figure));
+    panel.append(...all(":scope > div > div:is(:has(> input), .rbcourse-choice, .rbcourse-numbers)", figure));
     section.querySelector(".words").append(panel);
     settle(section);
     new ResizeObserver(() => fit(figure)).observe(panel); // the numbers come later
