@@ -24,6 +24,7 @@ __import__("shown").record({folder!r})
 SHARES = {
     # these extra columns need not be drawn
     r"paper_fig5[ab], (drawn \[1\]|[wva]\d'? \[(rad|m)\])": 0,
+    r"paper_fig5[ab], R\d\d \[1\]": 0.7,  # two of the eight cubes are omitted
     # the picture shows these columns by the order of points, or by colours
     r".*, (.* )?(t \[(1|s)\]|path \[1\]|frame|family|body|problems \[1\])": 0,
     r".*, (.* )?theta\d? \[rad\]": 0,  # the positions of links and corners show this column
