@@ -30,7 +30,7 @@ from rbcourse._valid import as_poses
 from rbcourse.curves.projected import projected_cubic
 from rbcourse.draw import bodies, coordinates, families
 from rbcourse.draw.drawing import Drawing, run, style
-from rbcourse.draw.save import COLOURS, Table
+from rbcourse.draw.save import Table
 from rbcourse.optimum.two_poses import minimum_acceleration
 from rbcourse.se3 import pose_from_components, pose_from_coordinates, twist_from_rates
 from rbcourse.so3 import exp_so3
@@ -200,11 +200,11 @@ def figure_5(
         compared = best(drawn)[2:6] if panel == "b" else ()
         bodies.draw_cube_motion(ax, shown, side=2, omitted=(1, 6), compared=compared)
         if panel == "b":
-            ax.text(0, 2.6, 9, "orange outlines:\noptimum", color=COLOURS["x"], ha="center")
+            ax.text(0, 2.6, 9, "black outlines:\noptimum", ha="center")
     said = {
         "a": "Optimum: a cube moves with the least acceleration. ",
-        "b": "Projection: the same cube; outlines of the optimum are orange at the middle four "
-        "times. ",
+        "b": "Projection: the same cube; it has pink edges, and outlines of the optimum are "
+        "black at the middle four times. ",
     }
     alt = said[panel] + bodies.describe_cube_motion(shown)
     return Drawing(fig, f"paper_fig5{panel}", bodies.motion_table(t, motion, drawn), alt)

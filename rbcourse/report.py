@@ -71,7 +71,13 @@ from rbcourse.draw.arm import path_table as joint_table
 from rbcourse.draw.drawing import Drawing, run, style
 from rbcourse.draw.plane import describe_route, extent_of, moving_route
 from rbcourse.draw.plane import path_table as route_table
-from rbcourse.draw.spheres import Images, describe_images, image_table, moving_images
+from rbcourse.draw.spheres import (
+    Images,
+    describe_images,
+    image_table,
+    in_middle_half,
+    moving_images,
+)
 from rbcourse.planar import Plan, as_plan, interpolate_planar, propagate_planar
 from rbcourse.projection import is_se, is_so, project_se, project_so
 from rbcourse.quaternion import (
@@ -517,8 +523,11 @@ def _two_spheres(name: str, images: Images) -> Drawing:
     with style():
         shape: Any = {"figsize": (5.8, 3), "layout": "none"}
         fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"}, **shape)
-        fig.subplots_adjust(0, 0, 1, 0.9, 0)
+        fig.subplots_adjust(0, 0.08, 1, 0.9, 0)
         update = moving_images(axes, images)
+        for ax, (v0, _) in zip(axes, images.values(), strict=True):
+            said = f"middle half: {in_middle_half(v0)} of {len(v0)}"
+            fig.text(np.mean(ax.get_position().intervalx), 0.02, said, ha="center")
     frames = len(next(iter(images.values()))[0]) + 1
     moving = update, frames, max(6.0, frames / 25)
     return Drawing(fig, name, image_table(images), describe_images(images), moving)

@@ -38,7 +38,7 @@ def _panels(*kinds: str, foot: float = 0.13) -> Iterator[tuple[Figure, list[Any]
     A fraction `foot` of the height, below the axes, is for notes.
     """
     with plt.style.context(_STYLES):
-        fig = Figure(figsize=(5.8, 2.6), dpi=96)
+        fig = Figure(figsize=(5.8, 2.4), dpi=96)
         fig.set_layout_engine("constrained", rect=(0, foot, 1, 1 - foot))
         axes = [fig.add_subplot(1, len(kinds), k + 1, projection=x) for k, x in enumerate(kinds)]
         yield fig, axes

@@ -10,12 +10,22 @@ function guard(notebook) {
   });
 }
 
+// Open the answer below; return what was found: the answer, or null.
 function open(from) {
   let cell = from.closest(".jp-Cell");
   do cell = cell?.nextElementSibling; while (cell && !cell.querySelector(":is(h1, h2, h3)"));
   const answer = cell?.querySelector("h3")?.textContent.startsWith("Answer to") ? cell : null;
   answer?.querySelector(".jp-showHiddenCellsButton")?.click();
-  return Boolean(answer);
+  return answer;
+}
+
+// Return the letter of the right option: the answer's text begins with it.
+function right(cell) {
+  for (; cell; cell = cell.nextElementSibling) {
+    const letter = cell.querySelector(".jp-RenderedMarkdown > p > strong:first-child")?.textContent;
+    if (/^[A-F]$/.test(letter)) return letter;
+    if (cell.querySelector("h2")) return null;
+  }
 }
 
 export default {
@@ -33,7 +43,12 @@ export default {
           each.classList.toggle("mod-active", each === button);
           each.setAttribute("aria-pressed", each === button);
         });
-        said.textContent = open(el) ? "" : " The answer is below.";
+        const answer = open(el);
+        setTimeout(() => { // JupyterLab draws the opened cells first
+          const best = right(answer);
+          const verdict = best === letter ? `${letter} is right.` : `You chose ${letter}; the answer is ${best}.`;
+          said.textContent = best ? ` ${verdict}` : " The answer is below.";
+        }, 300);
       };
       return button;
     });

@@ -73,9 +73,9 @@ def move_box(box: Faces, pose: Array, edges: float | Array) -> None:
 
 
 def _draw_outline(ax: Any, pose: Array, edges: float | Array) -> Faces:
-    """Draw the orange edges of a box."""
+    """Draw only the edges of a box."""
     box = draw_box(ax, pose, edges)
-    box.set(colours=7 * ["none"], edgecolor=COLOURS["x"])
+    box.set(colours=7 * ["none"], edgecolor=COLOURS["optimum"])
     return box
 
 
@@ -90,12 +90,14 @@ def draw_cube_motion(
     """Draw a cube at each pose, and stars in front of the cubes at their centres.
 
     The edges of the cubes have the length `side` in m. Poses with the indices `omitted` have a star
-    but no cube. Behind these cubes, orange outlines show cubes at the poses `compared`. Return the
-    artists of the cubes, and then the stars (BK Fig. 5).
+    but no cube. Behind these cubes, black outlines show cubes at the poses `compared`; then the
+    edges of the cubes are pink. Return the artists of the cubes, and then the stars (BK Fig. 5).
     """
     for pose in compared:
         _draw_outline(ax, pose, side).set_zorder(-1)
     cubes = [draw_box(ax, pose, side) for i, pose in enumerate(poses) if i not in omitted]
+    for cube in cubes if len(compared) else ():
+        cube.set_edgecolor(COLOURS["projection"])
     set_space(ax, poses[:, :3, 3], side, zoom=1.1)
     stars = draw_centre_path(ax, poses[:, :3, 3])
     stars.set_zorder(OVER)
@@ -234,9 +236,9 @@ def moving_boxes(
 
     The motions have the same number of poses. `edges` gives the lengths of a box's edges in m, or
     one length for cubes. Boxes that stay at the origin are drawn larger; they have the axes of the
-    fixed frame instead of a floor. On the last axes, an orange outline shows the box in the motion
-    `compared`. Return ``update(i)``, which moves all boxes to pose i of their motions and returns
-    their artists, the outline last.
+    fixed frame instead of a floor. On the last axes, a black outline shows the box in the motion
+    `compared`, and the box has pink edges. Return ``update(i)``, which moves all boxes to pose i of
+    their motions and returns their artists, the outline last.
     """
     ways = list(motions.values())
     boxes = [draw_box(ax, poses[0], edges) for ax, poses in zip(axes, ways, strict=True)]
@@ -249,6 +251,7 @@ def moving_boxes(
             set_turning(ax, reach, zoom=1.5, named=True)
         ax.set_title(name)
     if compared is not None:
+        boxes[-1].set_edgecolor(COLOURS["projection"])
         ways.append(compared)
         boxes.append(_draw_outline(axes[-1], compared[0], edges))
         boxes[-1].set_linewidth(2)

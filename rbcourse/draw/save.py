@@ -17,6 +17,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 from numpy.typing import ArrayLike, NDArray
@@ -144,7 +145,8 @@ def cuts_of(fig: Figure) -> list[float]:
     """Return the places between columns of axes, as fractions of the width of a drawn figure.
 
     A narrow column, such as the bar of colours, belongs to its left neighbour. There are no cuts if
-    a column has less than a fifth of the width, or if a text of the figure is over a cut.
+    a column has less than a fifth of the width, if a text of the figure is over a cut, or if the
+    numbers beside an axis belong to another column, too.
     """
     width, columns = fig.bbox.width, list[list[float]]()
     boxes = [box for ax in fig.axes if (box := ax.get_tightbbox())]
@@ -156,9 +158,20 @@ def cuts_of(fig: Figure) -> list[float]:
     cuts = [(left[1] + right[0]) / 2 for left, right in pairwise(columns)]
     over = [each.get_window_extent().intervalx for each in [*fig.texts, *fig.legends]]
     narrow = min(np.diff([0, *cuts, width])) < width / 5
-    if narrow or any(low < cut < high for cut in cuts for low, high in over):
+    if (
+        narrow
+        or any(map(_without_numbers, fig.axes))
+        or any(low < cut < high for cut in cuts for low, high in over)
+    ):
         return []
     return [float(cut / width) for cut in cuts]
+
+
+def _without_numbers(ax: Axes) -> bool:
+    """Tell whether the numbers of the vertical axis are only beside another axes."""
+    sides = ax.yaxis.get_tick_params()
+    labels = sides.get("labelleft", True) or sides.get("labelright", False)
+    return ax.axison and not labels and bool(ax.get_yticks().size)
 
 
 def _turning(fig: Figure, name: str, alt: str, text: str) -> Player:

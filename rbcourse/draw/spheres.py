@@ -71,12 +71,15 @@ def moving_images(axes: Sequence[Any], images: Images) -> Callable[[int], list[A
     return update
 
 
+def in_middle_half(points: Array) -> int:
+    """Return how many points of the unit sphere are in the middle half of its height."""
+    return int(np.sum(np.abs(points[:, 2]) < 0.5))
+
+
 def describe_images(images: Images) -> str:
     """Return a description of the picture of `moving_images`."""
     count = len(next(iter(images.values()))[0])
-    said = ", ".join(
-        f"{name}: {(np.abs(v0[:, 2]) < 0.5).sum()}" for name, (v0, _) in images.items()
-    )
+    said = ", ".join(f"{name}: {in_middle_half(v0)}" for name, (v0, _) in images.items())
     return (
         f"Images of the pole of a sphere under {count} random rotations: {', '.join(images)}. A "
         "stroke at each image shows the turn about it. Numbers of images in the middle half of the "

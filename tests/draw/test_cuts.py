@@ -41,6 +41,13 @@ def test_a_bar_of_colours_stays_with_its_axes():
     plt.close(fig)
 
 
+def test_columns_that_share_their_numbers_stay_together():
+    fig, axes = drawn(2)
+    axes[0, 1].tick_params(labelleft=False)
+    assert cuts_of(fig) == []
+    plt.close(fig)
+
+
 def test_no_cut_goes_through_a_text():
     fig, _ = drawn(2, suptitle="A title of the whole figure, which is above both columns")
     assert cuts_of(fig) == []

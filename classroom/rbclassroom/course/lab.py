@@ -22,6 +22,7 @@ STYLE = """[data-jp-theme-light="false"] :is(figure, .rbcourse-explorer) :is(img
   filter: invert(0.93) hue-rotate(180deg);
 }
 .jp-Notebook .jp-RenderedMarkdown :is(p, ul, ol, blockquote, details) { max-width: 50em; }
+.jp-Notebook .jp-RenderedMarkdown table { margin-left: 0; }
 """
 STILLS = """from rbclassroom.course.notebooks import before_saving
 get_config().ContentsManager.pre_save_hook = before_saving

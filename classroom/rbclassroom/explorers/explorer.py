@@ -113,7 +113,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
             "parts": [part.model_id for part in (self.time, self.play, said, *others)],
         }
         # the picture grows with the cell
-        most = f"{1.5 * self.display.width:.0f}px"
+        most = f"{1.25 * self.display.width:.0f}px"
         wide = {"flex": f"2 1 {self.display.width}px", "min_width": "0", "max_width": most}
         self.picture = Canvas(made=made, layout=wide)
         panel = ipywidgets.VBox(

@@ -78,7 +78,7 @@ def minimum_acceleration_explorer() -> Explorer:
 def cube_explorer() -> Explorer:
     """Return an explorer of Figure 5: one cube follows the optimum, another the projection.
 
-    An orange outline shows the optimum around the projection, too, and texts show the costs of the
+    A black outline shows the optimum around the projection, too, and texts show the costs of the
     rotations until the time t, in rad². The boundary conditions are those of the paper, but three
     of them can be changed. The goal has a pale colour. The controls are the ``turn``, as a fraction
     of the paper's; ``spin``, the last component of ω(1) in rad per unit time; ``rise``, the last
@@ -101,9 +101,10 @@ def cube_explorer() -> Explorer:
             fig.text(left + 0.25, 0.94, way, ha="center")
             artists[f"{way} cost"] = fig.text(left + 0.25, 0.87, "", ha="center")
         artists["difference"] = draw_box(ax, np.eye(4), _SIDE)
-        artists["difference"].set(edgecolor=COLOURS["x"], **_OUTLINE)
+        artists["difference"].set(edgecolor=COLOURS["optimum"], **_OUTLINE)
+        artists["projection"].set_edgecolor(COLOURS["projection"])
         fig.text(0.25, 0.02, "axes: 5 m long", ha="center")
-        fig.text(0.75, 0.02, "orange: the optimum", color=COLOURS["x"], ha="center")
+        fig.text(0.75, 0.02, "black: the optimum", ha="center")
     controls = {
         "turn": widgets.slider("turn (1: paper's)", 1.0, 0.0, 1.15, 0.05),
         "spin": widgets.slider("ω₃(1) (rad/time)", 1.0, -6.0, 6.0, 0.25),

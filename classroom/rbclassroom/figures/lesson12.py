@@ -23,9 +23,8 @@ _LOOKS: dict[str, tuple[str, str]] = {
     "quaternion": ("screw", "D"),
     "Cayley": ("reference", "x"),
     "normal": ("y", "*"),
+    "weighted": ("reference", "p"),
 }
-_OF_BODY = {"weighted": ("z", "p"), "Bézier": ("reference", "^")}
-"""Other looks of curves in figures with the weighted projection, as in the sketches."""
 SHOWN = "projection", "quaternion", "Bézier"
 """The curves with a map; the tables have all curves."""
 _BEHIND = "quaternion", "Cayley"
@@ -134,9 +133,8 @@ def draw_growth(ax: Axes, data: Table, slopes: Mapping[int, float]) -> None:
     (BK 1, BK 7).
     """
     size, medians = np.asarray(data["size [rad]"]), _medians(data)
-    looks = _LOOKS | (_OF_BODY if "weighted" in medians else {})
     for way, median in medians.items():
-        colour, mark = looks.get(way, _OTHER)
+        colour, mark = _LOOKS.get(way, _OTHER)
         named_line: Any = {"marker": mark, "ms": 8, "label": way, "color": COLOURS[colour]}
         grey: Any = {"lw": 1, "label": f"_{way}", "color": PALE, "zorder": 1}
         ax.plot(size, median, "-", **(grey if way in _BEHIND else named_line))

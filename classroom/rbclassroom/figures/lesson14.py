@@ -23,7 +23,7 @@ _TIME = "t [s]"
 EXCESSES: dict[str, dict[str, Any]] = {
     "parabolas": {"color": COLOURS["z"], "ls": "-."},
     "projected spline": {"color": COLOURS["projection"], "ls": "-"},
-    "quaternion spline": {"color": COLOURS["x"], "ls": "--"},
+    "quaternion spline": {"color": COLOURS["screw"], "ls": "--"},
     "SciPy's spline": {"color": COLOURS["reference"], "ls": ":"},
 }
 """The curves of `excess_table`, and the styles of their lines."""

@@ -12,7 +12,7 @@ from rbclassroom.course.notebooks import KERNEL
 # One explorer of each kind: in the plane, with a menu, with buttons, and in space. Each entry also
 # has the place and the name of the slider that the test moves. The last explorer solves a problem
 # for each picture.
-KINDS = {"theta": (1, "t"), "chain": (0, "duration"), "flip": (0, "off"), "cube": (1, "spin")}
+KINDS = {"theta": (0, "t"), "chain": (1, "duration"), "flip": (1, "off"), "cube": (2, "spin")}
 
 # A function that records when keys go down, and when the screen shows a new picture.
 NOTE = """() => {

@@ -27,7 +27,7 @@ SCROLLING = """(explorer) => [explorer, ...explorer.querySelectorAll("*")]
   .map((box) => [box.className, box.scrollHeight, box.clientHeight])"""
 # A function that stops a playing explorer. It runs in the page, where a slow test cannot delay it.
 PAUSE = """async (explorer) => {
-  const number = [...explorer.querySelectorAll(".widget-readout")].at(-1);
+  const number = explorer.querySelector(".widget-readout");
   while (parseFloat(number.innerText) < 0.1) await new Promise(requestAnimationFrame);
   explorer.querySelector("button").click();
 }"""
@@ -78,12 +78,12 @@ def test_a_stored_lesson_is_complete_and_its_explorer_works(opened, page):
     assert not page.evaluate(DIRTY)
 
     explorer = run_explorer(page, path)
-    explorer.locator(".noUi-handle").first.press("ArrowRight")
+    explorer.locator(".noUi-handle").last.press("ArrowRight")
     explorer.locator("span[role=status]").wait_for(state="attached")
     assert explorer.evaluate(SCROLLING) == []
 
     page.evaluate(f"{PANEL}.sessionContext.shutdown()")
-    explorer.locator(".noUi-handle").first.press("ArrowRight")
+    explorer.locator(".noUi-handle").last.press("ArrowRight")
     explorer.get_by_role("alert").get_by_text("Python does not answer").wait_for()
     assert explorer.locator("tr").count() == 0
     page.evaluate(f"{PANEL}.context.save()")
@@ -117,6 +117,9 @@ def test_a_vote_opens_the_answer_and_shift_enter_passes_it(opened, page):
     votes.get_by_role("button", name="B").click()
     page.wait_for_function(f"!{PANEL}.content.widgets[{closed}].isHidden")
     assert votes.locator("[aria-pressed=true]").all_inner_texts() == ["B"]
+    expect(votes).to_contain_text("You chose B; the answer is A.")
+    votes.get_by_role("button", name="A").click()
+    expect(votes).to_contain_text("A is right.")
     assert page.evaluate(state, ids.index("cell-28"))[1]  # the next answer is still closed
 
 
@@ -132,7 +135,7 @@ def settled(page, text):
 def test_keys_start_and_reset_an_explorer(opened, page):
     explorer = run_explorer(page, opened("02_two_link_arm", "play"))
     assert page.evaluate(SEEN) == []
-    time, play = explorer.locator(".widget-readout").last, explorer.locator("button").first
+    time, play = explorer.locator(".widget-readout").first, explorer.locator("button").first
     expect(time).to_have_text("0.00")
     play.press("Enter")
     explorer.evaluate(PAUSE)
@@ -145,7 +148,7 @@ def test_keys_start_and_reset_an_explorer(opened, page):
     reset.press("Enter")  # during the playback
     expect(time).to_have_text("0.00")
     assert settled(page, time) == "0.00"
-    handle = explorer.locator(".noUi-handle").last
+    handle = explorer.locator(".noUi-handle").first
     expect(handle).to_have_attribute("aria-label", "time t")
     handle.press("ArrowRight")
     expect(handle).to_have_attribute("aria-valuetext", "0.01")
