@@ -23,7 +23,13 @@ from traitlets import Bool, Integer
 from traitlets.config import Config
 
 from rbclassroom.assignments import feedback, locked_cells, sandbox
-from rbclassroom.assignments.feedback import LINK, UNSEEN, FeedbackExporter, GetResults, Summarise
+from rbclassroom.assignments.feedback import (
+    UNSEEN,
+    FeedbackExporter,
+    GetResults,
+    Summarise,
+    without_links,
+)
 from rbclassroom.assignments.locked_cells import marks_of, name_cell
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 from rbclassroom.assignments.submissions import Refused, read_notebook, restore
@@ -130,7 +136,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
                 output.metadata = NotebookNode()
                 output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
                 if "text/latex" in output.data:
-                    output.data["text/latex"] = LINK.sub(r"\\text", output.data["text/latex"])
+                    output.data["text/latex"] = without_links(output.data["text/latex"])
             # scores are known only while feedback is made
             failed = marks.get("points") and not marks.get("score", True)
             if locked_cells.is_test(cell) and failed and not errors:

@@ -24,7 +24,8 @@ TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl
 TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
 TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
 TAGS |= {"th", "thead", "tr", "ul"}
-LINK = re.compile(r"(\\|&#0*92;?|&#x0*5c;?|&bsol;)href", re.IGNORECASE)  # a command of MathJax
+_CODED = re.compile(r"&(?:#(x[0-9a-f]+|[0-9]+);?|(bsol);)", re.IGNORECASE)
+_LINK = re.compile(r"\\href", re.IGNORECASE)  # a command of MathJax
 
 
 class FeedbackExporter(HTMLExporter):
@@ -85,7 +86,7 @@ def _row(cells: list[NotebookNode], at: int, table: dict[str, Any]) -> dict[str,
         "score": marks["score"],
         "points": marks["points"],
         "waits": marks["waits"],
-        "said": [LINK.sub(r"\\text", text[:600]) for text in said],
+        "said": [without_links(text[:600]) for text in said],
         "read": table.get(slug, {}).get("read", ""),
         "comment": marks.get("comment") or "",
     }
@@ -127,7 +128,25 @@ def inert_html(content: object) -> str:
         return tag == "img" and (name in ("alt", "title") or embedded)
 
     inert = bleach.clean(str(content), TAGS, is_inert, protocols={"data"})
-    return LINK.sub(r"\\text", str(inert))
+    return without_links(str(inert))
+
+
+def without_links(text: str) -> str:
+    r"""Return HTML or TeX in which MathJax finds no links, also if they are written in codes.
+
+    Examples
+    --------
+    >>> without_links("&#x5C;h&#114;ef{https://a.b}{c} &#60;")
+    '\\text{https://a.b}{c} &#60;'
+    """
+
+    def letter(coded: re.Match[str]) -> str:
+        number = (coded[1] or "92").lower()
+        code = int(number[1:], 16) if number.startswith("x") else int(number)
+        known = code < 128 and (chr(code).isalnum() or chr(code) == "\\")
+        return chr(code) if known else coded[0]
+
+    return _LINK.sub(r"\\text", _CODED.sub(letter, text))
 
 
 class _Renderer(IPythonRenderer):

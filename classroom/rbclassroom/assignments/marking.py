@@ -34,7 +34,7 @@ GENERAL: dict[str, Callable[[Array, Array], list[Array]]] = {
     ),
     "Your result has one axis too many.": lambda right, got: [right[None], right[..., None]],
     "Your result is only the beginning of the right one. Is return inside a loop?": (
-        lambda right, got: [_rows(right)[: len(_rows(got))], _rows(right)[0]]
+        lambda right, got: [_first_rows(right, len(_rows(got))), _rows(right)[0]]
     ),
 }
 """The hints of mistakes that can be made in every problem, and the results of these mistakes."""
@@ -247,6 +247,12 @@ def show(value: Any) -> str:
     if isinstance(value, np.ndarray) and value.size > SHOWN:
         return f"an array of shape {value.shape}"
     return value if isinstance(value, str) else repr(_plain(value))[:300]
+
+
+def _first_rows(right: Array, count: int) -> Array:
+    """Return the first results; no loop makes more than one row of a square matrix at a time."""
+    square = right.ndim == 2 and len(right) == right.shape[1]
+    return _rows(right)[: 1 if square else count]
 
 
 def _rows(array: Array) -> Array:

@@ -35,7 +35,7 @@ def theta_explorer() -> Explorer:
     with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.58, 0.82))
         # the height 0 is that of the right picture
-        ax.set(xlim=(-1.03, 1.3), ylim=(-0.218, 1.25), aspect="equal", anchor="SW")
+        ax.set(xlim=(-1.06, 1.3), ylim=(-0.221, 1.25), aspect="equal", anchor="SW")
         ax.set_axis_off()
         side = fig.add_axes((0.665, 0.18, 0.31, 0.72))
         side.set(xlim=(0, 1), ylim=(0, 1), xticks=[0, 0.5, 1], yticks=[0, 0.5, 1])

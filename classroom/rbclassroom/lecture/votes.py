@@ -34,13 +34,15 @@ class Ballot:
         self.key = self.poll = ""
         self.options: dict[str, str] = {}
         self.open = False
+        self.question = ""
         self.votes: dict[str, str] = {}
         self.counts: Counter[str] = Counter()
 
-    def begin(self, poll: str, options: list[str]) -> None:
+    def begin(self, poll: str, question: str, options: list[str]) -> None:
         """Open a vote on a poll if no vote is open; its counts will replace the earlier counts."""
         if not self.open:
             self.key, self.poll, self.open = secrets.token_hex(8), poll, True
+            self.question = question
             self.options = dict(zip(string.ascii_uppercase, options, strict=False))
 
     def close(self) -> None:

@@ -43,9 +43,15 @@ def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> 
     the cell again. Otherwise return an empty string.
     """
     module = sys.modules["__main__"] = ModuleType("__main__")
+    module.__dict__["input"] = _no_input
     hidden, written = _Written(lambda *_: None), _Written(show)
+    cells, unread = {}, list[SyntaxError]()
+    for k, each in enumerate(above, 1):
+        try:
+            cells[f"<cell {k}>"] = parsed(each, f"<cell {k}>")
+        except SyntaxError as error:  # the other cells run without it, if they can
+            unread.append(error)
     try:
-        cells = {f"<cell {k}>": parsed(each, f"<cell {k}>") for k, each in enumerate(above, 1)}
         cell = parsed(source, "<this cell>")
         kept = needed([each for some in cells.values() for each in some], cell)
         with redirect_stdout(hidden), redirect_stderr(hidden):
@@ -63,9 +69,13 @@ def run(above: Sequence[str], source: str, known: Sequence[str], show: Show) -> 
         package = (getattr(error, "name", None) or "").partition(".")[0]
         if isinstance(error, ModuleNotFoundError) and package in known:
             return package
-        show(*_told(error))
+        show(*_told(unread[0] if unread and isinstance(error, NameError) else error))
     _take_figures(show)
     return ""
+
+
+def _no_input(*_: object) -> None:
+    raise EOFError("input() has no answer here; write the value into the code")
 
 
 class _Written(io.TextIOBase):
@@ -111,4 +121,7 @@ def _told(error: BaseException) -> tuple[str, str]:
         for frame in traceback.extract_tb(error.__traceback__)
         if frame.filename.startswith(("<cell ", "<this cell"))
     ]
-    return "error", "\n".join([*lines, "".join(traceback.format_exception_only(error))]).rstrip()
+    lines += traceback.format_exception_only(error)
+    if isinstance(error, SyntaxError) and "U+00A0" in str(error):
+        lines.append("This is a no-break space, often from a copied text: type a normal space.")
+    return "error", "\n".join(line.rstrip() for line in lines)

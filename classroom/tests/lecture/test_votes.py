@@ -105,7 +105,7 @@ def test_joins_and_open_connections_of_a_program_block_no_phone(monkeypatch):
 
     def attacked(url, ballot):
         cookies = [ask(url)[2] for _ in range(2)]  # two phones join before the vote
-        ballot.begin("Poll 1", OPTIONS)
+        ballot.begin("Poll 1", "Which <b>way</b>?", OPTIONS)
         opened = [ask(url)[0] for _ in range(500)]
         assert (opened.count(200), opened.count(503)) == (3, 497)
         assert "tries again" in ask(url)[1]
@@ -137,7 +137,7 @@ def vote(url, letters):
     status, page, cookie = ask(url)
     assert status == 200
     assert re.findall(r'value="(.)"', page) == list("ABCD")
-    assert all(option in page for option in OPTIONS)
+    assert all(shown in page for shown in ["Which <b>way</b>?", *OPTIONS])
     (key,) = re.findall(r'name="vote" value="(\w+)"', page)
     for letter in letters:
         body = urlencode({"choice": letter, "vote": key})
@@ -164,7 +164,7 @@ def test_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
             status, text, _ = ask(f"{desk}?token={token}", method, body)
             return json.loads(text) if status == 200 else status
 
-        begin = {"poll": "Poll 1", "options": OPTIONS}
+        begin = {"poll": "Poll 1", "question": "Which <b>way</b>?", "options": OPTIONS}
         assert "No vote is open" in ask(url)[1]
         for other in ("", "?token=", f"?token={token[:-1]}!", "?token=%C3%A9"):
             assert ask(desk + other)[0] == 403
@@ -186,7 +186,9 @@ def test_the_count_is_hidden_until_the_vote_is_closed(tmp_path):
         odd = late.replace("choice=A", "choice=E")
         assert ask(url, "POST", odd, **FORM, Cookie=cookies[0])[0] == 303
         assert f"You voted {letters[0][-1]}." in ask(url, Cookie=cookies[0])[1]
-        now = state({"poll": "Poll 2", "options": OPTIONS})  # the vote on poll 1 remains open
+        now = state(
+            {"poll": "Poll 2", "question": "", "options": OPTIONS}
+        )  # the vote on poll 1 remains open
         assert now["address"] == url
         assert now["code"].startswith("<svg")
         assert (now["open"], now["voters"], now["counts"]) == (True, len(letters), [])

@@ -105,3 +105,20 @@ def test_missing_packages_that_can_be_loaded_are_named():
     missing, _, found = run([], "import not_there")
     assert missing == ""
     assert "No module named 'not_there'" in found[-1][1]
+
+
+def test_a_cell_above_that_cannot_be_read_stops_only_cells_that_need_it():
+    above = ["x = 1", "def broken(:\n    return 1"]
+    assert run(above, "print(x)")[1] == "1\n"
+    *_, found = run(above, "broken()")
+    ((kind, said),) = found
+    assert kind == "error"
+    assert "cell 2" in said
+    assert "SyntaxError" in said
+
+
+def test_input_and_no_break_spaces_are_explained():
+    ((_, said),) = run([], "input('x')")[2]
+    assert "write the value into the code" in said
+    ((_, said),) = run([], "x =\u00a01")[2]
+    assert "type a normal space" in said

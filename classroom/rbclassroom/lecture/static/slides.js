@@ -84,8 +84,9 @@ const keys = {
   T: ["Open or close a vote", () => {
     if (window !== window.top) return window.top.opener?.Reveal.triggerKey(84); // in the speaker view
     const section = Reveal.getCurrentSlide(), poll = section.dataset.poll;
-    const options = all(".option > div", section).map(({ innerHTML }) => innerHTML.replace(/<mjx-assistive-mml.*?<\/mjx-assistive-mml>/gs, ""));
-    if (voting && (poll || state.open)) ask(state.open ? {} : { poll, options });
+    const shown = (parts) => all(parts, section).map(({ innerHTML }) => innerHTML.replace(/<mjx-assistive-mml.*?<\/mjx-assistive-mml>/gs, ""));
+    const question = shown(".words > p").join("<br>"), options = shown(".option > div");
+    if (voting && (poll || state.open)) ask(state.open ? {} : { poll, question, options });
   }],
 };
 
