@@ -417,7 +417,7 @@ def figure_4(*, rng: Rng = 4, steps: int = 100) -> Drawing:
     for name, sample in (("three angles", sample_rotation_naive), ("uniform", sample_rotation)):
         R = sample(count, rng=rng)
         images[name] = R @ _V0, R @ _V1
-    return _two_spheres("report_fig4", images)
+    return _two_spheres("report_fig4", images, "rotation matrices")
 
 
 def figure_5(*, rng: Rng = 6, steps: int = 100) -> Drawing:
@@ -434,7 +434,7 @@ def figure_5(*, rng: Rng = 6, steps: int = 100) -> Drawing:
     for name, sample in (("three angles", sample_quaternion_naive), ("uniform", sample_quaternion)):
         q = sample(count, rng=rng)
         images[name] = rotate_by_quaternion(q, _V0), rotate_by_quaternion(q, _V1)
-    return _two_spheres("report_fig5", images)
+    return _two_spheres("report_fig5", images, "quaternions")
 
 
 def figure_6(
@@ -458,7 +458,8 @@ def figure_6(
     ends = as_single("start", start, 3), as_single("goal", goal, 3)
     path = interpolate_planar(*ends, steps)
     pale = range(0, len(path), max(1, steps // 5))
-    return _moving("report_fig6", path, pale, {"figsize": (5, 3.4)}, length=length)
+    shape, what = {"figsize": (5, 3.4)}, "a rectangle between two poses"
+    return _moving("report_fig6", path, pale, shape, length=length, what=what)
 
 
 def figure_7(*, plan: Plan = _ROUTE, length: float = 1.2) -> Drawing:
@@ -475,7 +476,8 @@ def figure_7(*, plan: Plan = _ROUTE, length: float = 1.2) -> Drawing:
     """
     pieces, pale = _pieces(plan, 3)
     path = forward_propagate_rigid_body([0, 0, 0], pieces)
-    return _moving("report_fig7", path, pale, {"figsize": (7, 3.1), "dpi": 80}, 5.0, length=length)
+    shape, what = {"figsize": (7, 3.1), "dpi": 80}, "a rectangle that follows a plan"
+    return _moving("report_fig7", path, pale, shape, 5.0, length=length, what=what)
 
 
 def figure_8(
@@ -519,7 +521,7 @@ FIGURES: dict[str, Callable[..., Drawing]] = {
 """The functions of the figures by their names."""
 
 
-def _two_spheres(name: str, images: Images) -> Drawing:
+def _two_spheres(name: str, images: Images, kind: str) -> Drawing:
     with style():
         shape: Any = {"figsize": (5.8, 3), "layout": "none"}
         fig, axes = plt.subplots(1, 2, subplot_kw={"projection": "space"}, **shape)
@@ -530,7 +532,7 @@ def _two_spheres(name: str, images: Images) -> Drawing:
             fig.text(np.mean(ax.get_position().intervalx), 0.02, said, ha="center")
     frames = len(next(iter(images.values()))[0]) + 1
     moving = update, frames, max(6.0, frames / 25)
-    return Drawing(fig, name, image_table(images), describe_images(images), moving)
+    return Drawing(fig, name, image_table(images), describe_images(images, kind), moving)
 
 
 def _pieces(plan: Plan, size: int) -> tuple[Plan, list[int]]:
@@ -557,15 +559,16 @@ def _moving(
     seconds: float = 4.0,
     *,
     length: float | None = None,
+    what: str = "",
 ) -> Drawing:
-    """Draw a path of a rectangle, or of an arm if no length is given."""
+    """Draw a path of a rectangle, or of an arm if no length is given; `what` is for the caption."""
     with style():
         fig, ax = plt.subplots(**shape)
         if length is None:
             update, data, alt = moving_arm(ax, path, pale), joint_table(path), describe_arm(path)
         else:
             update = moving_route(ax, path, length, pale)
-            data, alt = route_table(path), describe_route(path)
+            data, alt = route_table(path), describe_route(path, what)
     return Drawing(fig, name, data, alt, (update, len(path), max(seconds, len(path) / 25)))
 
 

@@ -127,7 +127,7 @@ def extent_of(path: Array) -> float:
     return extent if extent > 1e-12 * max(1.0, np.abs(places).max()) else 0.0
 
 
-def describe_route(path: Array) -> str:
+def describe_route(path: Array, what: str = "a rectangle") -> str:
     """Return a description of the motion of a rectangle."""
     steps = np.diff(path, axis=0)
     turns = np.degrees(steps[:, 2])
@@ -137,7 +137,7 @@ def describe_route(path: Array) -> str:
     way = np.hypot(steps[:, 0], steps[:, 1]).sum() if extent else 0.0
     start, end = (_said(pose, extent or 1.0) for pose in path[[0, -1]])
     return (
-        f"Path of the centre of a rectangle, and some of its poses. The rectangle goes from "
+        f"Path of the centre of {what}, and some of its poses. The rectangle goes from "
         f"{start}, to {end}. From state to state its centre covers {in_words(way, way)} m, and it "
         f"turns by {' and '.join(said) or 'less than a degree'}."
     )

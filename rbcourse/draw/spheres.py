@@ -76,12 +76,12 @@ def in_middle_half(points: Array) -> int:
     return int(np.sum(np.abs(points[:, 2]) < 0.5))
 
 
-def describe_images(images: Images) -> str:
-    """Return a description of the picture of `moving_images`."""
+def describe_images(images: Images, kind: str = "rotations") -> str:
+    """Return a description of the picture of `moving_images`; `kind` is the kind of the samples."""
     count = len(next(iter(images.values()))[0])
     said = ", ".join(f"{name}: {in_middle_half(v0)}" for name, (v0, _) in images.items())
     return (
-        f"Images of the pole of a sphere under {count} random rotations: {', '.join(images)}. A "
+        f"Images of the pole of a sphere under {count} random {kind}: {', '.join(images)}. A "
         "stroke at each image shows the turn about it. Numbers of images in the middle half of the "
         f"height, which is half of the area: {said}."
     )

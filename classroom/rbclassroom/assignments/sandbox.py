@@ -47,8 +47,9 @@ def missing() -> str:
     with tempfile.TemporaryDirectory() as folder:
         prepare(Path(folder))
         words = [*box(Path(folder), 60), sys.executable, "-c", "import ipykernel, rbclassroom"]
+        settings: dict[str, Any] = {"capture_output": True, "text": True, "errors": "replace"}
         try:
-            subprocess.run(words, capture_output=True, text=True, errors="replace", check=True)
+            subprocess.run(words, env=environment(Path(folder)), check=True, **settings)
         except subprocess.CalledProcessError as error:
             said = (error.stderr.strip() or f"its exit code is {error.returncode}").splitlines()[-1]
             return f"bubblewrap does not work here ({said}); user namespaces have to be allowed"
