@@ -236,7 +236,6 @@ def test_another_optimiser_finds_no_cheaper_curve_from_random_starts(what):
     assert np.mean(least < 1.01 * best) > 0.6
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", KNOWN)
 def test_the_cheapest_known_curve_is_found(case):
     (what, numbers), cost = case.split(" ", 1), KNOWN[case]

@@ -167,7 +167,6 @@ def test_the_optimal_spline_through_samples_of_an_optimum_equals_this_optimum():
     assert c.cost == pytest.approx(rb.minimum_jerk(R0, R1, w0, w1, a, a).cost, rel=1e-10)
 
 
-@pytest.mark.slow
 @pytest.mark.source("beyond BK 12")
 def test_the_optimum_agrees_with_the_textbook():
     t, R = path(3, 80, 8)

@@ -328,7 +328,6 @@ def test_the_times_of_legs_between_stops_do_not_matter():
     assert T[1:] == pytest.approx([T[0]] * 2, rel=1e-12)
 
 
-@pytest.mark.slow
 def test_a_recording_needs_little_memory():
     t, poses = recording(0, 2000)
     path = spline(t, poses)

@@ -117,7 +117,8 @@ const rbcourseDisplay = {
     const [styles, said] = JSON.parse(new TextDecoder().decode(await rbcourseDisplay.inflate(known)));
     const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
     const width = `width: ${size[0]}px; max-width: 100%`;
-    const canvas = make("canvas", { style: `display: block; ${width}`, role: "img", ariaLabel: image.alt });
+    // before the first drawing, too, the canvas has the shape of the picture
+    const canvas = make("canvas", { width: size[0], height: size[1], style: `display: block; ${width}`, role: "img", ariaLabel: image.alt });
     const panel = make("div", { style: width }), table = make("div", { className: "rbcourse-numbers" });
     const rows = controls.map(({ label, values, first, plays }, number) => {
       const max = values.length - 1, exact = values.map((text) => parseFloat(text.replace("−", "-")));

@@ -124,7 +124,7 @@ def test_at_least_250_cells_can_be_run():
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(x, marks=[pytest.mark.slow] * (x not in ("ps1", "ps5", "ps6"))) for x in SETS],
+    [pytest.param(x, marks=[pytest.mark.slow] * (x not in ("ps1", "ps6"))) for x in SETS],
 )
 def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
     setup = cells(name)["setup"].source, TABLES[name]["helpers"]
