@@ -24,7 +24,9 @@ TAGS = {"a", "b", "blockquote", "br", "code", "dd", "del", "details", "div", "dl
 TAGS |= {"em", "h1", "h2", "h3", "h4", "h5", "h6", "hr", "i", "img", "li", "ol", "p", "pre"}
 TAGS |= {"s", "span", "strong", "sub", "summary", "sup", "table", "tbody", "td", "tfoot"}
 TAGS |= {"th", "thead", "tr", "ul"}
-_CODED = re.compile(r"&(?:#(x[0-9a-f]+|[0-9]+);?|(bsol);)", re.IGNORECASE)
+_CODED = re.compile(  # a character in decimal or hexadecimal code, below 1,000 or 256
+    r"&(?:#0*([0-9]{1,3})(?![0-9]);?|#x0*([0-9a-f]{1,2})(?![0-9a-f]);?|bsol;)", re.IGNORECASE
+)
 _LINK = re.compile(r"\\href", re.IGNORECASE)  # a command of MathJax
 
 
@@ -141,8 +143,7 @@ def without_links(text: str) -> str:
     """
 
     def letter(coded: re.Match[str]) -> str:
-        number = (coded[1] or "92").lower()
-        code = int(number[1:], 16) if number.startswith("x") else int(number)
+        code = int(coded[2], 16) if coded[2] else int(coded[1] or 92)
         known = code < 128 and (chr(code).isalnum() or chr(code) == "\\")
         return chr(code) if known else coded[0]
 
