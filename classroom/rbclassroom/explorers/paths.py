@@ -1,5 +1,6 @@
 """Explorers of motions through many rotations or poses."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -76,20 +77,10 @@ def spline_explorer() -> Explorer:
     }
 
     def show(ends: str, pitch: float, third: float, t: float) -> dict[str, str]:
-        times, angles = np.array([0, 1, third, 4]), ANGLES.copy()
-        angles[2, 1] = pitch
-        R = rb.matrix_from_zyx(np.radians(angles))
-        conditions: Any = "rest" if ends == "at rest" else "natural"
-        w = rb.bessel_velocities(times, R)
-        w[[0, -1]] *= ends == "natural"
-        curves = rb.chain(times, R, w), rb.projected_spline(times, R, conditions)
-        starts, h = times[:-1, None], np.diff(times)[:, None]
-        # times on both sides of each knot
-        inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()
-        inside[:: len(_BETWEEN)] = times[:-1]
-        said, costs = {}, []
-        for kind, curve in zip(KINDS, curves, strict=True):
-            path, now, a = curve(inside), curve(t), np.linalg.norm(curve(inside, 2), axis=-1)
+        times, R, curves, shares = _two_splines(ends, pitch, third)
+        said = {}
+        for kind, (curve, inside, path, a) in zip(KINDS, curves, strict=True):
+            now = curve(t)
             artists[f"{kind} path"].set_data_3d(*path[:, :, 0].T)
             artists[f"{kind} given"].set_data_3d(*R[:, :, 0].T)
             artists[f"{kind} up"].set_data_3d(*(now[:, :1] + now[:, 2:] * [0, 0.35]))
@@ -101,14 +92,31 @@ def spline_explorer() -> Explorer:
             jumps = np.linalg.norm(curve.jumps(2), axis=1)[times[1:-1] <= t]
             jumped = f"by {numbers(jumps, 2)} rad/s²" if len(jumps) else "not yet"
             said[f"{kind}: ω′ jumps"] = jumped
-            costs.append(rb.acceleration_cost(curve))
-        least = rb.minimum_acceleration_spline(times, R, conditions).cost
-        for kind, cost in zip(KINDS, costs, strict=True):
-            said[f"{kind}: cost"] = f"{numbers(cost / least, 3)} × the least"
+        for kind, share in zip(KINDS, shares, strict=True):
+            said[f"{kind}: cost"] = f"{numbers(share, 3)} × the least"
         return said
 
     name = "Four orientations, two curves"
     return Explorer(name, fig, artists, controls, show, plays="t")
+
+
+@lru_cache(maxsize=64)
+def _two_splines(ends: str, pitch: float, third: float) -> tuple[Any, ...]:
+    """Return times and rotations, what is drawn of each curve, and costs divided by the least."""
+    times, angles = np.array([0, 1, third, 4]), ANGLES.copy()
+    angles[2, 1] = pitch
+    R = rb.matrix_from_zyx(np.radians(angles))
+    conditions: Any = "rest" if ends == "at rest" else "natural"
+    w = rb.bessel_velocities(times, R)
+    w[[0, -1]] *= ends == "natural"
+    starts, h = times[:-1, None], np.diff(times)[:, None]
+    # times on both sides of each knot
+    inside = np.nextafter(starts + h * _BETWEEN, starts).ravel()
+    inside[:: len(_BETWEEN)] = times[:-1]
+    splines = rb.chain(times, R, w), rb.projected_spline(times, R, conditions)
+    curves = [(c, inside, c(inside), np.linalg.norm(c(inside, 2), axis=-1)) for c in splines]
+    least = rb.minimum_acceleration_spline(times, R, conditions).cost
+    return times, R, curves, [rb.acceleration_cost(c) / least for c in splines]
 
 
 def chain_explorer() -> Explorer:
@@ -143,31 +151,40 @@ def chain_explorer() -> Explorer:
     }
 
     def show(curve: str, duration: float, t: float) -> dict[str, str]:
-        knots = duration * SHARES
-        motion, best = _joined(curve, knots), _joined(JOINED[-1], knots)
-        times, now = np.linspace(0, duration, 241), t * duration
-        artists["way"].set_data_3d(*motion(times)[:, :3, 3].T)
+        motion, times, path, speeds, texts = _through_poses(curve, duration)
+        now, knots = t * duration, duration * SHARES
+        artists["way"].set_data_3d(*path.T)
         move_box(artists["box"], motion(now), EDGES)
-        speeds, here = _norms(motion(times, 1)), _norms(motion(now, 1))
+        here = _norms(motion(now, 1))
         for i, (name, high) in enumerate(_WAYS.items()):
             artists[name].set_data(times, speeds[:, i])
             artists[f"{name} now"].set_data([now], here[:, i])
             artists[f"{name} joints"].set_segments([[(k, 0), (k, high)] for k in knots[1:-1]])
-        fastest, strongest = speeds.max(axis=0), _norms(motion(times, 2)).max(axis=0)
-        jumps = [_norms(motion.jumps(order))[:, 0].max() for order in (1, 2)]
-        cost = "infinite: ω jumps"
-        if curve != JOINED[0]:
-            costs = [rb.acceleration_cost_parts(c)[0] for c in (motion, best)]
-            cost = f"{numbers(costs[0] / costs[1], 3)} × the least"
-        return {
-            "fastest": f"{numbers(fastest[0], 2)} rad/s, {numbers(fastest[1], 2)} m/s",
-            "strongest": f"{numbers(strongest[0], 2)} rad/s², {numbers(strongest[1], 2)} m/s²",
-            "ω jumps": f"by {numbers(jumps[0], 2)} rad/s",
-            "ω′ jumps": f"by {numbers(jumps[1], 2)} rad/s²",
-            "cost of turning": cost,
-        }
+        return texts
 
     return Explorer("Through four poses", fig, artists, controls, show, plays="t", seconds=6.0)
+
+
+@lru_cache(maxsize=64)
+def _through_poses(curve: str, duration: float) -> tuple[Any, ...]:
+    """Return the motion, times with its positions and speeds, and the texts."""
+    knots, times = duration * SHARES, np.linspace(0, duration, 241)
+    motion, best = _joined(curve, knots), _joined(JOINED[-1], knots)
+    speeds = _norms(motion(times, 1))
+    fastest, strongest = speeds.max(axis=0), _norms(motion(times, 2)).max(axis=0)
+    jumps = [_norms(motion.jumps(order))[:, 0].max() for order in (1, 2)]
+    cost = "infinite: ω jumps"
+    if curve != JOINED[0]:
+        costs = [rb.acceleration_cost_parts(c)[0] for c in (motion, best)]
+        cost = f"{numbers(costs[0] / costs[1], 3)} × the least"
+    texts = {
+        "fastest": f"{numbers(fastest[0], 2)} rad/s, {numbers(fastest[1], 2)} m/s",
+        "strongest": f"{numbers(strongest[0], 2)} rad/s², {numbers(strongest[1], 2)} m/s²",
+        "ω jumps": f"by {numbers(jumps[0], 2)} rad/s",
+        "ω′ jumps": f"by {numbers(jumps[1], 2)} rad/s²",
+        "cost of turning": cost,
+    }
+    return motion, times, motion(times)[:, :3, 3], speeds, texts
 
 
 def _joined(curve: str, knots: rb.Array) -> Any:

@@ -31,7 +31,10 @@ TESTS = [
     for cell in notebook.cells
     if cell.metadata.nbgrader.grade_id.endswith("-test")
 ]
-problems = pytest.mark.parametrize(("name", "slug"), TESTS)
+problems = pytest.mark.parametrize(
+    ("name", "slug"),
+    [pytest.param(*x, marks=[pytest.mark.slow] * (x == ("ps5", "shoot"))) for x in TESTS],
+)
 sets = pytest.mark.parametrize("name", SETS)
 
 

@@ -17,6 +17,7 @@ import nbformat
 import pytest
 from pages import watched
 from playwright.sync_api import expect
+from quick import quick_for
 from test_problems import SETS, SOURCE, TABLES, TESTS, cells, head
 from test_sets_graded import regions
 
@@ -88,14 +89,7 @@ def told(outputs):
     return shown(texts), pictures
 
 
-@pytest.mark.parametrize(
-    "path",
-    [
-        pytest.param(path, marks=[] if path.stem[:2] == "06" else pytest.mark.slow)
-        for path in LESSONS
-    ],
-    ids=lambda path: path.stem[:2],
-)
+@pytest.mark.parametrize("path", quick_for(["01"], LESSONS))
 def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
     """Cells on the list of exceptions must give a different text. Slow cells are not run."""
     listed, notebook = LEFT_OUT.get(path.stem, {}), nbformat.read(path, as_version=4)
@@ -122,10 +116,7 @@ def test_at_least_250_cells_can_be_run():
     assert sum(len(re.findall(r"\btag_try-", page)) for page in pages) >= 250
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(x, marks=[pytest.mark.slow] * (x not in ("ps1", "ps6"))) for x in SETS],
-)
+@pytest.mark.parametrize("name", quick_for(["ps1"], SETS))
 def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
     setup = cells(name)["setup"].source, TABLES[name]["helpers"]
     answers = {key: cell.source for key, cell in cells(name).items() if key.endswith("-answer")}
@@ -191,7 +182,7 @@ def test_a_changed_cell_can_be_stopped_and_reset(page, address):
     expect(part.locator(".cell_output canvas")).to_be_visible()
     code = part.locator(".cm-content")
     code.press("ControlOrMeta+a")
-    page.keyboard.insert_text("while True:\n    print(1, end='')")
+    page.keyboard.insert_text("print(1)\nwhile True:\n    pass")
     part.get_by_role("button", name="Run").click()
     part.locator(".outputs pre").wait_for()
     part.get_by_role("button", name="Stop").click()

@@ -410,6 +410,7 @@ def test_both_curves_pass_through_the_orientations():
 
 
 @pytest.mark.source("beyond BK 16")
+@pytest.mark.slow
 def test_the_timing_stays_below_the_limits_of_its_path():
     path = rb.projected_spline(np.arange(4.0), POSES)
     fastest, s = cache(partial(rb.fastest, path)), np.linspace(0, 3, 241)
@@ -438,6 +439,7 @@ def test_the_timing_stays_below_the_limits_of_its_path():
 
 
 @pytest.mark.source("beyond BK 17")
+@pytest.mark.slow
 def test_the_smoothed_curve_and_its_errors_are_those_of_the_package():
     truth, R1 = motion_of_the_hand(), recorded(1.0)
     off_truth = rb.angle_between(R1, truth(RECORDED))

@@ -1,0 +1,16 @@
+"""The choice of the tests that .ci/run leaves out."""
+
+from pathlib import Path
+
+import pytest
+
+
+def quick_for(names, values):
+    """Return values, or paths, as parameters of a test. Names of lessons have two digits. All are
+    slow whose names are not among `names`."""
+    params = []
+    for value in values:
+        name = value.stem[:2] if isinstance(value, Path) else value
+        marks = [] if name in names else pytest.mark.slow
+        params.append(pytest.param(value, id=name, marks=marks))
+    return params
