@@ -1,7 +1,7 @@
 """Compare times with other packages: ``.venv/bin/python benchmarks/benchmarks.py``.
 
 Each function of a task prepares N items, and yields methods that do the same with them, ours first.
-The run takes about ten minutes, and writes the CSV, the figure and the README's table.
+The run takes about 15 minutes, and writes the CSV, the figure and the README's table.
 """
 
 import csv
@@ -17,7 +17,6 @@ from timeit import Timer, default_timer
 
 import matplotlib.pyplot as plt
 import numpy as np
-from pytransform3d.batch_rotations import matrices_from_quaternions, quaternion_slerp_batch
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
@@ -28,11 +27,10 @@ from rbcourse.files import replace_file
 
 try:
     import roma
-    import toppra
     import torch
     from toppra import algorithm, constraint, interpolator
 except ImportError:
-    roma = toppra = torch = None
+    roma = torch = None
 
 OURS, MOMENTS = "rbcourse", np.linspace(0, 1, 101)
 ALONG, E1 = np.pi / 6 * np.array([1, 2, 3]), np.array([1.0, 0, 0])
@@ -61,78 +59,85 @@ def geodesic(n, rng):
     R0, t = rb.sample_rotation(rng=rng), rng.random(n)
     R1 = R0 @ rb.exp_so3([1, -1, 1.5])
     ours, both = rb.geodesic(R0, R1), Rotation.from_matrix([R0, R1])
-    theirs, xyzw = Slerp([0, 1], both), both.as_quat()
-    batch = partial(quaternion_slerp_batch, *np.roll(xyzw, 1, axis=1), t, shortest_path=True)
+    theirs = Slerp([0, 1], both)
     yield OURS, lambda: ours(t)
     yield "textbook", lambda: textbook.geodesic(R0, R1, t)
     yield "SciPy", lambda: theirs(t).as_matrix()
-    yield "SciPy, as Rotation", lambda: theirs(t)
-    yield "pytransform3d", lambda: matrices_from_quaternions(batch())
-    yield "pytransform3d, as quaternions", batch
     if roma:
-        slerp = partial(roma.unitquat_slerp, *map(torch.from_numpy, (*xyzw, t)))
+        slerp = partial(roma.unitquat_slerp, *map(torch.from_numpy, (*both.as_quat(), t)))
         yield "RoMa", lambda: roma.unitquat_to_rotmat(slerp())
-        yield "RoMa, as quaternions", slerp
 
 
-def projected_cubic(n, rng, orders):
-    """Evaluate a projected cubic, with velocity and acceleration if `orders` is 3, at n times."""
-    t, (R0, R1, w0, w1), knots = rng.random(n), ENDS["5"], np.linspace(0, 1, 5)
-    ours, theirs = rb.projected_cubic(*ENDS["5"]), textbook.projected_cubic
+def projected_cubic(n, rng):
+    """Evaluate a curve with the ends of BK Figure 5, its velocity and acceleration at n times."""
+    t, knots, ours = rng.random(n), np.linspace(0, 1, 5), rb.projected_cubic(*ENDS["5"])
     spline = RotationSpline(knots, Rotation.from_matrix(ours(knots)))
-    cubic = textbook.cubic_coefficients(R0, R1, R0 @ rb.hat_so3(w0), R1 @ rb.hat_so3(w1))
-
-    def by_textbook():
-        if orders > 1:
-            return theirs(*ENDS["5"], t)
-        return [textbook.project_so(textbook.polynomial(cubic, t[:, None, None]))]
-
-    yield OURS, lambda: [ours(t, k) for k in range(orders)]
-    yield "textbook", by_textbook
-    yield "SciPy, another curve", lambda: [spline(t), *(spline(t, k) for k in range(1, orders))]
+    yield OURS, lambda: [*ours.state(t)]
+    yield "textbook", lambda: textbook.projected_cubic(*ENDS["5"], t)
+    yield "SciPy, another curve", lambda: [spline(t), spline(t, 1), spline(t, 2)]
+    for form, make in list(FORMS.items())[1:]:
+        yield f"rbcourse, {form}", partial(make(*ENDS["5"]).state, t)
 
 
-def closed_forms(n, rng, orders):
-    """Evaluate curves of closed forms with the same ends, and their derivatives, at n times."""
-    t = rng.random(n)
-    for form, make in FORMS.items():
-        curve, name = make(*ENDS["5"]), OURS if form == "projection" else f"rbcourse, {form}"
-        yield name, partial(lambda curve: [curve(t, order) for order in range(orders)], curve)
+def random_rotations(n, rng):
+    """Sample n rotation matrices."""
+    yield OURS, lambda: rb.sample_rotation(n, rng=rng)
+    yield "textbook", lambda: textbook.sample_rotation(n, rng)
+    yield "SciPy", lambda: Rotation.random(n, rng).as_matrix()
 
 
-def random_samples(n, rng, kind, form, name):
-    """Sample n matrices or unit quaternions."""
-    convert = getattr(Rotation, f"as_{form}")
-    yield OURS, lambda: getattr(rb, f"sample_{kind}")(n, rng=rng)
-    yield "textbook", lambda: getattr(textbook, f"sample_{kind}")(n, rng)
-    yield "SciPy", lambda: convert(Rotation.random(n, rng))
-    yield "SciPy, as Rotation", lambda: Rotation.random(n, rng)
-    if roma:
-        yield "RoMa", partial(getattr(roma, name), n, dtype=torch.float64)
+def walk(n, rng):
+    """Return n times, at 100 Hz, and smooth coordinates of poses, shape (n, 6)."""
+    times, knots = np.arange(n) / 100, np.linspace(0, n / 100, 4 + n // 50)
+    return times, CubicSpline(knots, rng.normal(0, 0.3, (len(knots), 6)))(times)
 
 
-def chain_of_poses(n, rng, make):
-    """Evaluate a chain of 1,000 poses at n increasing times; making the chain is not timed."""
-    when, places = np.cumsum(rng.uniform(0.5, 1.5, 1000)), rng.normal(size=(1000, 3)).cumsum(0)
-    R, t = rb.exp_so3(rng.normal(0, 0.5, (1000, 3)).cumsum(0)), np.linspace(when[0], when[-1], n)
-    motion = make(when, rb.pose_from_components(R, places))
-    turning, path = RotationSpline(when, Rotation.from_matrix(R)), CubicSpline(when, places)
-    yield OURS, lambda: motion(t)
-    yield "SciPy, another curve", lambda: (turning(t).as_matrix(), path(t))
+def by_scipy(times, poses):
+    """Make the curves that are nearest to a projected spline in SciPy."""
+    turning = RotationSpline(times, Rotation.from_matrix(poses[:, :3, :3]))
+    return turning, CubicSpline(times, poses[:, :3, 3])
+
+
+def spline_of_poses(n, rng):
+    """Evaluate a projected spline of 1,000 poses, with its derivatives, at n times."""
+    times, x = walk(1000, rng)
+    given, t = (times, rb.pose_from_coordinates(x)), np.linspace(0, times[-1], n + 2)[1:-1]
+    motion, theirs, t = rb.projected_spline(*given, "rest"), by_scipy(*given), t.squeeze()
+    yield OURS, lambda: motion.state(t)
+    yield "SciPy, another curve", lambda: [c(t, k) for c in theirs for k in range(3)]
+
+
+def recording(n, rng):
+    """Make a projected spline through a recording of n poses; smooth the recording; time it."""
+    times, x = walk(n, rng)
+    poses, noisy = map(rb.pose_from_coordinates, (x, x + rng.normal(0, 1e-3, x.shape)))
+    motion, limits = rb.projected_spline(times, poses, "rest"), {"speed": 1, "acceleration": 3}
+    yield OURS, lambda: rb.projected_spline(times, poses, "rest")
+    yield "SciPy, another curve", lambda: by_scipy(times, poses)
+    yield "rbcourse, smoothing", lambda: rb.smoothing_spline(times, noisy)
+    yield "rbcourse, fastest timing", lambda: rb.fastest(motion, **limits)
+
+
+def making(n, rng):
+    """Make n projected cubics."""
+    ends = *rb.sample_rotation((2, n), rng=rng), *rng.normal(size=(2, n, 3))
+    yield OURS, lambda: rb.projected_cubic(*ends)
+    yield "rbcourse, Bézier", lambda: rb.closed_forms.bezier(*ends)
 
 
 def fastest_timing(n, rng):
     """Find the fastest timing of one leg, with limits for each component of the acceleration."""
-    A1, s = rb.exp_se3([0.6, -0.4, 0.5, 0.3, 0.7, -0.2]), np.linspace(0, 1, 1001)
-    leg = rb.geodesic(np.eye(4), A1)
+    leg = rb.geodesic(np.eye(4), rb.exp_se3([0.6, -0.4, 0.5, 0.3, 0.7, -0.2]))
     yield OURS, lambda: rb.fastest(leg, angular_acceleration=3 * [4], acceleration=3 * [3]).duration
 
     def by_toppra():
-        solver = algorithm.TOPPRA([limits], Leg(), gridpoints=s, solver_wrapper="seidel")
+        solver = algorithm.TOPPRA(
+            [limits], Leg(), gridpoints=np.linspace(0, 1, 1001), solver_wrapper="seidel"
+        )
         rate = solver.compute_parameterization(0, 0)[1]
         return np.sum(2 / 1000 / (rate[1:] + rate[:-1]))
 
-    if toppra:
+    if roma:
         limits = constraint.JointAccelerationConstraint(np.outer([4, 4, 4, 3, 3, 3], [-1, 1]))
 
         class Leg(interpolator.AbstractGeometricPath):
@@ -153,18 +158,14 @@ def one_optimum(n, rng, case):
 
 
 ALL, SOME = tuple(10**k for k in range(7)), (1, 1000, 10**6)
-SPLINE, LEGS = partial(rb.projected_spline, ends="rest"), partial(rb.chain, leg=rb.geodesic)
 TASKS = [  # the name of the task, the case, the numbers of items, and the function with its options
     ("nearest rotation", "noisy", ALL, nearest_rotation),
     ("geodesic at N times", "", ALL, geodesic),
-    ("projected cubic at N times", "", ALL, projected_cubic, 1),
-    ("projected cubic with derivatives", "", ALL, projected_cubic, 3),
-    ("random rotation matrices", "", ALL, random_samples, "rotation", "matrix", "random_rotmat"),
-    ("random quaternions", "", ALL, random_samples, "quaternion", "quat", "random_unitquat"),
-    ("closed forms at N times", "", SOME, closed_forms, 1),
-    ("closed forms with derivatives", "", SOME, closed_forms, 3),
-    ("chain at N times", "projected cubics", SOME, chain_of_poses, SPLINE),
-    ("chain at N times", "geodesics", SOME, chain_of_poses, LEGS),
+    ("projected cubic at N times", "with derivatives", SOME, projected_cubic),
+    ("random rotations", "", ALL, random_rotations),
+    ("spline of 1,000 poses at N times", "with derivatives", SOME[::-1], spline_of_poses),
+    ("making N projected cubics", "", (1, 1000, 10**5), making),
+    ("motion through a recording of N poses", "100 Hz", (1000, 200_000), recording),
     ("fastest timing", "one leg", (1,), fastest_timing),
     *(("optimum, one problem", case, (1,), one_optimum, case) for case in ENDS),
 ]
@@ -172,7 +173,6 @@ TASKS = [  # the name of the task, the case, the numbers of items, and the funct
 COLUMNS = ("task", "case", "N [1]", "method", "time [s]", "time low [s]", "time high [s]")
 COLUMNS += ("times ours [1]", "times ours low [1]", "times ours high [1]", "rounds [1]", "machine")
 COLOURS = {OURS: "#0072B2", "textbook": "#000000", "SciPy": "#D55E00", "RoMa": "#009E73"}
-COLOURS |= {"pytransform3d": "#AA4499", "NumPy": "#777777"}
 
 
 def main(tasks=TASKS, folder=Path(__file__).parent, **options):
@@ -197,17 +197,20 @@ def main(tasks=TASKS, folder=Path(__file__).parent, **options):
 
 
 def in_turn(calls, rounds=9, clock=default_timer):
-    """Return the seconds per call, shape (rounds, calls); each round runs every call."""
+    """Return seconds per call, shape (rounds, calls); one round if a call takes more than 10 s."""
     timers = [Timer(call, timer=clock) for call in calls]
-    pairs = [(timer, timer.autorange()[0]) for timer in timers]
+    first = [timer.autorange() for timer in timers]
+    if max(seconds for _, seconds in first) > 10:
+        return np.array([[seconds / n for n, seconds in first]])
+    pairs = [(timer, n) for timer, (n, _) in zip(timers, first, strict=True)]
     return np.array([[timer.timeit(n) / n for timer, n in pairs] for _ in range(rounds)])
 
 
 def machine():
     """Return the processor, the number of its threads, and the versions of the packages."""
-    file, names = Path("/proc/cpuinfo"), ["numpy", "scipy", "pytransform3d"]
-    known = re.search(r"model name\s*: (.*)", file.read_text() if file.exists() else "")
-    processor = known[1] if known else platform.machine()
+    file, names = Path("/proc/cpuinfo"), ["numpy", "scipy"]
+    known = re.findall(r"model name\s*: (.*)", file.read_text() if file.exists() else "")
+    processor = [*known, platform.machine()][0]
     versions = [f"{x} {version(x)}" for x in names + ["roma", "torch", "toppra"] * bool(roma)]
     return "; ".join([processor, f"{os.cpu_count()} threads", *versions])
 
@@ -234,7 +237,7 @@ def draw(rows):
                 mine = [row for row in here if row["method"] == name]
                 n, time = np.array([[float(row[x]) for x in COLUMNS[2:5:2]] for row in mine]).T
                 author, *more = name.split(",")
-                look = {"color": COLOURS[author], "lw": 4 if name == OURS else 1.5}
+                look = {"color": COLOURS.get(author, "#777777"), "lw": 4 if name == OURS else 1.5}
                 ax.plot(n, 1e6 * time / n, "o:" if more else "o-", label=name, **look)
             ax.set(xscale="log", yscale="log", title=task, xlabel="N", ylabel="µs for each")
         lines = {line.get_label(): line for ax in axes.flat for line in ax.lines}

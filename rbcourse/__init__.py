@@ -113,7 +113,7 @@ from rbcourse.so3 import (
     vee_so3,
 )
 
-__version__ = "2.0.0a2"
+__version__ = "2.0.0"
 
 __all__ = [  # noqa: RUF022 - sorted by subject
     # rotations

@@ -3,4 +3,4 @@
 This package uses only the names that `rbcourse` exports.
 """
 
-__version__ = "2.0.0a2"
+__version__ = "2.0.0"

@@ -34,6 +34,7 @@ _DATA = re.compile(r'<script type="application/json">(.*?)</script>', re.DOTALL)
 _SAVED = re.compile(r"save_(figure|animation)\(|\.save\(\)")
 _TIME = re.compile(r"^(\| Time \| .*) \|$", re.MULTILINE)
 _FILES = re.compile(r"<small>(\w+)(\.\w+(?:, \.\w+)*)</small>")
+_PERCENT = re.compile(r"(?<=\d) (?=%)")
 _LESSON = re.compile(r"`[^`]*`|\$[^$]*\$|\[[^\]]*\]\([^)]*\)|<[^>]*>|\b(lesson (\d+))\b")
 _EXPLORER = re.compile(r"explorers\.(\w+)_explorer\(\)")
 
@@ -242,6 +243,7 @@ def prepare(
             text = relinked(_LESSON.sub(to_lesson, "\n".join(keyed)), path, page)
             if sheet:
                 text = _TIME.sub(rf"\1 · [run sheet for lecturers](../{sheet}) |", text)
+            text = _PERCENT.sub("\N{NO-BREAK SPACE}", text)
             cell.source = with_citations(text, works, here, "../references.html")
             continue
         explorer = _EXPLORER.search(cell.source)
