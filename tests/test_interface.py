@@ -196,3 +196,10 @@ def test_a_curve_that_jumps_is_described_without_a_graph():
     with pytest.warns(RuntimeWarning, match="jumps"):
         curve = rb.projected_line(np.eye(3), HALF_TURN)
     assert curve._repr_html_() == "<div>ProjectedLine on SO(3), t in [0, 1]</div>"
+
+
+def test_drawing_without_matplotlib_names_the_extra(monkeypatch):
+    monkeypatch.setattr(rb, "find_spec", lambda _: None)
+    for name in ("draw", "paper", "report"):
+        with pytest.raises(ImportError, match=rf"rbcourse.{name} needs Matplotlib .* extra draw"):
+            rb.__getattr__(name)

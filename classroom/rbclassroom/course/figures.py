@@ -74,7 +74,7 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
             for file in list(figures.iterdir()):
                 if OURS.fullmatch(file.name) and file.name not in names_drawn:
                     file.unlink()
-    print(f"{len(texts)} lessons run, {len(changed)} changed; figures changed: {len(stale)}")
+    print(f"lessons run: {len(texts)}, changed: {len(changed)}; figures changed: {len(stale)}")
 
 
 async def _executed(paths: Sequence[Path], figures: Path) -> dict[Path, str]:
