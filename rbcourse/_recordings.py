@@ -394,7 +394,8 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     if missing := [meaning for meaning in wanted if meaning not in found]:
         raise ValueError(
             f"{rows.file}: no column has the name {' or '.join(missing)}; rename those of the pose "
-            "to x, y, z, qw, qx, qy, qz, or use numpy.loadtxt and pose_from_components. The names "
+            "to x, y, z, qw, qx, qy, qz and that of the times to time. Or delete the line of names "
+            "and give format=, or use numpy.loadtxt and pose_from_components. The names "
             f"are {', '.join(rows.names)[:300]!r}"
         )
     lengths = {units[name] or "m" for name in POSITION if name in found} or {"m"}

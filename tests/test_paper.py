@@ -96,7 +96,7 @@ def test_bad_arguments_are_named(draw, options, message):
 
 
 def test_the_command_draws_figures_into_files(tmp_path, capsys):
-    words = ["--w1", "0.5", "-1", "7", "4c", "--folder", str(tmp_path / "mine")]
+    words = ["--w1", "0.5", "-1e0", "7", "4c", "--folder", str(tmp_path / "mine")]
     run("rbcourse.paper", paper.FIGURES, words)
     assert "paper_fig4c: png, pdf, csv" in capsys.readouterr().out
     files = sorted(path.name for path in (tmp_path / "mine").iterdir())
@@ -118,6 +118,17 @@ def test_the_command_draws_figures_into_files(tmp_path, capsys):
             run("rbcourse.paper", paper.FIGURES, [*words.split(), "--folder", str(tmp_path / "no")])
         assert re.search(message, capsys.readouterr().err)
     assert not (tmp_path / "no").exists()
+
+
+def test_lines_of_coordinates_do_not_show_jumps():
+    """The optimum passes 180° several times."""
+    drawing = paper.figure_4(w1=[0, 0, 40])
+    for line in drawing.figure.axes[1].lines[:3]:
+        steps = np.abs(np.diff(line.get_ydata()))
+        assert np.isnan(steps).any()
+        assert np.nanmax(steps) < 1
+    assert all(np.isfinite(column).all() for column in drawing.data.values())
+    plt.close(drawing.figure)
 
 
 def test_one_command_knows_the_figures_of_both_texts():

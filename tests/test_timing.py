@@ -265,6 +265,19 @@ def test_the_body_of_a_curve_is_timed():
     assert np.abs(tool(t[:-1]) - timed(t[:-1]) @ X).max() < 1e-9
 
 
+def test_the_centre_of_a_given_body_is_limited():
+    """The speed of the tip of a tool is found by differences of its places."""
+    c, tip = random_chain(9), np.array([0.3, -0.2, 0.1])
+    timed = rb.fastest(c, body=rb.Body(np.eye(3), centre=tip), speed=0.7, acceleration=3)
+    t = np.linspace(*timed.domain, 20_001)
+    places = timed(t)[:, :3, :3] @ tip + timed(t)[:, :3, 3]
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / np.diff(t)
+    assert speeds.max() == pytest.approx(0.7, rel=1e-4)
+    assert rb.limits_used(timed, speed=0.7)["speed"][0] == pytest.approx(1)
+    of_origin = rb.limits_used(timed, body=rb.Body(np.eye(3)), speed=0.7)
+    assert of_origin["speed"][0] != pytest.approx(1, rel=0.1)
+
+
 @pytest.mark.parametrize("name", SETS)
 def test_the_least_time_does_not_depend_on_the_clock(name):
     """Shift and scale the times. A shift loses the digits of the times below its ulp."""

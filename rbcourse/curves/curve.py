@@ -309,8 +309,9 @@ class Curve:
         -------
         Curve
             A curve with the same body, whose inertia and centre are relative to the new body frame,
-            and with the same costs. A `chain` remains a chain; other curves have the attribute
-            ``curve``, the original.
+            and with the same costs. `fastest` and `limits_used` still limit the speed of this
+            centre; for another point, give them a body. A `chain` remains a chain; other curves
+            have the attribute ``curve``, the original.
 
         Examples
         --------

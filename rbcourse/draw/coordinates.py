@@ -43,10 +43,13 @@ def draw_comparison(fig: Figure, data: Table) -> None:
     axes: Any = fig.subplot_mosaic("ab;ac", per_subplot_kw=space, height_ratios=[3, 2])
     # with fourteen decimals, the picture has the same pixels on every processor
     t, sigma = data["t [1]"], {name: _coordinates(name, data).round(14) for name in _STYLES}
-    _draw_paths(axes["a"], sigma)
     for name, style in _STYLES.items():
+        # σ jumps where the rotation passes 180°; a line does not show such a jump
+        jumps = np.linalg.norm(np.diff(sigma[name], axis=0), axis=1) > np.pi
+        sigma[name][1:][jumps] = np.nan
         for axis, part in zip("xyz", sigma[name].T, strict=True):
             axes["b"].plot(t, part, color=COLOURS[axis], clip_on=False, **style)
+    _draw_paths(axes["a"], sigma)
     looks = zip("xyz", ("-", "-.", ":"), _NAMES, strict=True)
     for k, (axis, dash, label) in enumerate(looks):
         axes["b"].text(1.04, sigma["optimum"][-1, k], label, color=COLOURS[axis], va="center")

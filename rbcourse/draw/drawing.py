@@ -2,6 +2,8 @@
 
 import argparse
 import inspect
+import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -17,6 +19,7 @@ from rbcourse.draw.animate import Animation, Update, frame_picture, render, save
 from rbcourse.draw.display import Player
 from rbcourse.draw.save import Picture, Table, as_png, csv_text, save_figure, write_figure
 
+_NEGATIVE = re.compile(r"-[\d.]+(e[+-]?\d+)?", re.I)
 OPTIONS: Mapping[str, tuple[tuple[int, ...], str]] = {
     "angles": ((-1,), "two or more increasing angles, in rad"),
     "rotation": ((3,), "the rotation vector of the moving frame, in rad"),
@@ -133,7 +136,10 @@ def run(
         if shape:
             kind["nargs"] = 3 if shape == (3,) else "+"
         parser.add_argument(f"--{name}", metavar="X", help=f"{meaning} ({known})", **kind)
-    given = vars(parser.parse_args(words))
+    # numbers such as -1e-3 are no options; with a space before them, argparse knows this
+    words = sys.argv[1:] if words is None else words
+    spaced = [f" {word}" if _NEGATIVE.fullmatch(word) else word for word in words]
+    given = vars(parser.parse_args(spaced))
     asked, folder = given.pop("figures"), given.pop("folder")
     values = {name: value for name, value in given.items() if value is not None}
     for word in asked:
