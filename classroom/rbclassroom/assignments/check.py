@@ -26,6 +26,9 @@ from rbclassroom.assignments.submissions import count_found, read_notebook, rest
 from rbclassroom.course import options
 from rbclassroom.course.notebooks import KERNEL
 
+HANDED = "to_submit"
+"""The folder of the file to hand in, beside the notebook."""
+
 
 def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """Compare a problem set with its original, run it, and write the file to submit.
@@ -36,6 +39,8 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     """
     if not path.is_file():
         raise ValueError(f"{path} is not a file; give the path of your notebook")
+    if path.parent.name == HANDED:
+        raise ValueError(f"{path} is a file to hand in; check the notebook in {path.parents[1]}")
     notebook = read_notebook(path.read_bytes(), path.name)
     name, files = _find_set(notebook, path.parent)
     original = nbformat.reads(files.pop(name).decode(), as_version=4)
@@ -43,7 +48,7 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     print(f"checking {path.name}, last saved {saved}", flush=True)
     print("cell numbers count all cells, as JupyterLab does at the bottom of its window")
     if path.name != name:
-        print(f"the file has to be submitted under the name {name}")
+        print(f"the file to hand in gets the name {name}")
     remarks = restore(notebook, original)
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
@@ -57,7 +62,7 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     passed = _print_problems(notebook, original)
     nbformat.validate(notebook)
     content = (nbformat.writes(notebook) + "\n").encode()
-    target = write_whole(path.parent / "to_submit" / name, content)
+    target = write_whole(path.parent / HANDED / name, content)
     print(f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run in grading")
     stem = name.removesuffix(".ipynb")
     _keep(notebook, stem, files.get(f"{stem}.json", b"{}"), path.parent)
@@ -156,6 +161,8 @@ def _error(cell: NotebookNode) -> str:
     if not errors:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
+    if errors[-1].ename == "SyntaxError":  # the name of the file is a number
+        lines = [re.sub(r"\(\S+, (line \d+)\)$", r"(\1)", lines[-1])]
     hint = lines[-1] and errors[-1].ename == "NotYet"  # show a hint without the name of its error
     return lines[-1][:400] if hint else f"{errors[-1].ename}: {lines[-1][:400]}".rstrip(": ")
 

@@ -17,6 +17,7 @@ from nbformat import NotebookNode
 from nbgrader import preprocessors as nbgrader
 
 from rbclassroom.assignments.locked_cells import is_test, marks_of, title_of
+from rbclassroom.assignments.student_code import EMPTY
 
 UNSEEN = "The visible tests pass, but a hidden test fails.\n"
 # students' HTML is shown without elements that run, load files or imitate the page
@@ -102,7 +103,7 @@ def _said(cell: NotebookNode) -> list[str]:
         if output.get("ename") in ("NotYet", "Timeout"):
             return "\n".join(output.traceback).split("\n\n")
         if output.get("ename") == "NotImplementedError":
-            return ["Nothing is written here yet."]
+            return [EMPTY]
         if output.output_type == "error":
             return [f"{output.ename}: {output.evalue}"]
     return []

@@ -38,7 +38,8 @@ class BoundedClient(NotebookClient):
     def __init__(self, *args: Any, **settings: Any) -> None:
         super().__init__(*args, **settings)
         self.allow_errors = self.interrupt_on_timeout = self.coalesce_streams = True
-        slow = {"ename": "TimeoutError", "evalue": "the cell took too long", "traceback": []}
+        why = "the cell took too long; does a loop in the answer never end?"
+        slow = {"ename": "TimeoutError", "evalue": why, "traceback": []}
         self.error_on_timeout, self.shutdown_kernel = slow, "immediate"
         self.extra_arguments, self.record_timing = ["--log-level=CRITICAL"], False
 

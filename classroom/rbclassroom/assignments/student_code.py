@@ -5,6 +5,8 @@ import textwrap
 import traceback
 from typing import Any
 
+EMPTY = "Your function stops at raise NotImplementedError(). Write your answer in place of it."
+
 
 class NotYet(AssertionError):
     """An error with a message for the student, which a notebook shows without a traceback.
@@ -34,7 +36,7 @@ def call_student(function: Any, arguments: tuple[Any, ...], times: int = 1) -> l
         if name != getattr(function, "__name__", name):
             why = f"Your function calls {name}, where nothing is written yet."
             raise NotYet(why) from None
-        raise NotYet("Nothing is written here yet.") from None
+        raise NotYet(EMPTY) from None
     except Exception as error:
         lines = [
             linecache.getline(frame.f_code.co_filename, line).strip()

@@ -18,7 +18,7 @@ LEFT_OUT = {
 _IN_PAGES = {  # sentences about Jupyter, and the sentences that replace them
     r"Each answer is followed by a test\. Run the test, and it tells you": "*Check*, below each "
     "answer, tells you",
-    r"Save the notebook\. Then run `rbclassroom\.assignments\.check .*": "Press *Check* below each "
+    r"Save the notebook\. Then run `python3 course\.py check .*": "Press *Check* below each "
     "answer once more. Then download the file, and hand it in where your teacher collects it.",
 }
 

@@ -93,7 +93,7 @@ def test_the_file_is_written_even_if_answers_have_faults(hand_in, capsys, monkey
     assert check.check(path) == path.parent / "to_submit" / "ps0.ipynb"
     said = capsys.readouterr().out
     for words in (
-        "submitted under the name ps0.ipynb",
+        "the file to hand in gets the name ps0.ipynb",
         "- cell 7, test of “A tiny set” was changed; it is restored, and its other text is in an",
         "- cell 10, added cell of “A tiny set” fails: NameError: name 'nowhere' is not",
         "FAILED  A tiny set: cell 4 AssertionError: times itself; cell 7 AssertionError; cell 9 is",
@@ -218,7 +218,14 @@ def test_a_missing_original_is_made_from_its_source(hand_in, tmp_path, monkeypat
     checked(path)
     assert cell(submitted(path), "half-test").source.startswith("assert half < 1")
     checked(path.rename(tmp_path / "mine.txt"))
-    assert "submitted under the name ps0.ipynb" in capsys.readouterr().out
+    assert "the file to hand in gets the name ps0.ipynb" in capsys.readouterr().out
+    with pytest.raises(SystemExit, match="is a file to hand in; check the notebook in"):
+        checked(path.parent / "to_submit" / "ps0.ipynb")
+
+
+def test_a_syntax_error_is_reported_without_a_number_as_its_file(hand_in, capsys):
+    check.check(hand_in(square="def square(x)\n    return x"))
+    assert "SyntaxError: expected ':' (line 1)" in capsys.readouterr().out
 
 
 def test_errors_are_reported_even_if_their_output_is_lost():

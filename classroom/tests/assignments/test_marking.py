@@ -46,7 +46,10 @@ DEGREES = f"{IN_RADIANS} There is a second mistake: sign"
         ("return (2 * k * x)[:, None] * [1, 2]", "the shape (2,) is wanted; yours is (2, 2)"),
         ("return x * np.nan", "your result is not finite: [nan, nan]"),
         ("x *= 2 * k\n    return x", "changes its arguments"),
-        ("raise NotImplementedError()", "Nothing is written here yet"),
+        (
+            "raise NotImplementedError()",
+            "stops at raise NotImplementedError(). Write your answer in place of it.",
+        ),
         ("return undefined", "stops: NameError: name 'undefined' is not defined"),
     ],
 )

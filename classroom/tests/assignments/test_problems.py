@@ -80,7 +80,7 @@ def test_reference_answers_pass_even_if_they_return_lists(name, slug):
     """If an answer that returns lists passes the visible tests, it must pass the hidden tests."""
     start, function = head(name, slug)
     test = cells(name)[f"{slug}-test"].source
-    with pytest.raises(NotYet, match="Nothing is written here yet"):
+    with pytest.raises(NotYet, match="Write your answer in place of it"):
         namespace(name, f"{start}    raise NotImplementedError()", test)
     listed = f"_inner = {function}\n\n\ndef {function}(*arguments):\n"
     listed += "    result = _inner(*arguments)\n    return np.asarray(result).tolist()\n"
@@ -179,7 +179,7 @@ def test_each_set_is_complete(name):
     assert "After this set you can" in texts[0]
     assert "**Mark scheme.**" in "".join(texts)
     assert any("draw_" in cell.source for cell in notebook.cells)
-    assert f"rbclassroom.assignments.check {name}.ipynb" in texts[-1]
+    assert f"course.py check work/{name}/{name}.ipynb" in texts[-1]
     for cell in notebook.cells:
         assert cell.metadata.nbgrader.locked != cell.metadata.nbgrader.solution
         assert not cell.get("outputs")

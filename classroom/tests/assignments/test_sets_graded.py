@@ -17,6 +17,7 @@ from test_problems import SETS, SOURCE, TABLES
 
 from rbclassroom.assignments.grade import grade
 from rbclassroom.assignments.handout import make_handout, release
+from rbclassroom.assignments.student_code import EMPTY
 
 FIRST, *_, LAST = SETS
 PROBLEMS = [slug for slug, table in TABLES[FIRST].items() if isinstance(table, dict)][1:]
@@ -112,7 +113,7 @@ def test_wrong_answers_get_hints_but_no_points(course):
     assert len(unseen) > 20
     assert not [line for line in unseen if line in page]
     hints = [TABLES[FIRST][slug]["mistakes"][-1]["hint"] for slug in PROBLEMS]
-    hints.append("Nothing is written here yet.")
+    hints.append(EMPTY)
     assert all(re.sub(r"\s", "", hint[:40]) in page for hint in hints)
 
 
