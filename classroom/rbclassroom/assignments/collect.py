@@ -64,15 +64,14 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
             continue
         rows.append((file.kind or "unmatched", file.label, why))
         if about:
-            unused[_label(about)].append(f"{file.label}: {why}")
+            unused[_label(about, roster)].append(f"{file.label}: {why}")
     for uploads in groups.values():
-        unused.pop(_label(uploads[0].about), None)
+        unused.pop(_label(uploads[0].about, roster), None)
     rows += [("nothing usable", who, "; ".join(reasons)) for who, reasons in sorted(unused.items())]
     numbers = defaultdict[tuple[str, str], list[str]](list)
     for name, student, number in sorted(groups):
         numbers[name, student].append(number)
-    stored = submitted / "owners.json"
-    before: dict[str, str] = json.loads(stored.read_text("utf-8")) if stored.exists() else {}
+    stored, before = submitted / "owners.json", read_owners(assignments)
     for (name, student), several in numbers.items():
         if len(several) > 1 and (submitted / student / name).exists():
             why = "students have this name, and now numbered folders; delete this one"
@@ -81,12 +80,17 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         *others, best = sorted(uploads, key=lambda upload: upload[:4])
         same, who = numbers[name, student], student
         is_known = student in {row["id"] for row in roster}
-        another = before.get(f"{student}/{name}", best.about["id"]) != best.about["id"]
+        owner = best.about["id"], best.about["name"]
+        another = before.get(f"{student}/{name}", owner)[0] != owner[0]
         if len(same) > 1 or (another and not is_known):
             plain = [_plain(each) for each in same]
             apart = len({*plain}) == len(plain)
             who = f"{student}_{_plain(number) if apart else same.index(number) + 1}"
-        before[f"{who}/{name}"] = best.about["id"]
+        for place in [key for key, known in before.items() if owner[0] and known == owner]:
+            if place.endswith(f"/{name}") and place != f"{who}/{name}":
+                rows.append(_move(submitted / place, submitted / who / name))
+                del before[place]
+        before[f"{who}/{name}"] = owner
         rows += [("duplicates", other.file, f"{best.file} is used instead") for other in others]
         rows.append(_take(best, submitted / who / name))
         if best.about.get("late"):
@@ -108,8 +112,29 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     return rows
 
 
-def _label(about: dict[str, str]) -> str:
-    """Return how a student is listed: the folder, or the name and the number in the LMS."""
+def read_owners(assignments: Path) -> dict[str, tuple[str, str]]:
+    """Return the number and the name in the LMS of each ``student/set`` that was collected."""
+    stored = assignments / "submitted" / "owners.json"
+    known = json.loads(stored.read_text("utf-8")) if stored.exists() else {}
+    return {key: (who, "") if isinstance(who, str) else tuple(who) for key, who in known.items()}
+
+
+def _move(old: Path, new: Path) -> Row:
+    """Move what was collected under another name, before the student was on the roster."""
+    who = f"{new.parent.name}, {new.name}"
+    if new.exists() or not old.exists():
+        why = f"the same student as {who}; delete this folder if it is there"
+        return "duplicates", f"submitted/{old.parent.name}/{old.name}", why
+    new.parent.mkdir(parents=True, exist_ok=True)
+    old.rename(new)
+    return "renamed", f"submitted/{old.parent.name}/{old.name}", f"is {who}"
+
+
+def _label(about: dict[str, str], roster: list[dict[str, str]]) -> str:
+    """Return how a student is listed: the id in the roster, the folder, or the name and number."""
+    student = _student(about, roster)
+    if student in {row["id"] for row in roster}:
+        return student
     return about["folder"] or f"{about['name']} {about['id']}".strip()
 
 

@@ -28,6 +28,7 @@ from traitlets.config import Config
 
 from rbclassroom.assignments import locked_cells, sandbox
 from rbclassroom.assignments.autograding import configure
+from rbclassroom.assignments.collect import read_owners
 from rbclassroom.assignments.handout import find_set, read_config
 from rbclassroom.assignments.locked_cells import grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
@@ -94,6 +95,10 @@ def _write_table(name: str, rows: list[Row], assignments: Path) -> Path:
     for row in rows:
         if row.get("late") == "" and f"{row['student']}, {name}" in _perhaps_late(assignments):
             row["late"] = "perhaps"
+    owners = read_owners(assignments)
+    for at, row in enumerate(rows):
+        number, who = owners.get(f"{row['student']}/{name}", ("", ""))
+        rows[at] = {"student": row["student"], "number": number, "name": who} | row
     for what, reason in _not_collected(name, assignments, {row["student"] for row in rows}):
         rows.append({"student": _tidy(what), "set": name, "remarks": _tidy(reason)})
         print(f"{name}, {rows[-1]['student']}: {rows[-1]['remarks']}", flush=True)
@@ -230,11 +235,14 @@ def _graded(
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
     sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
     report = _report(assignments)
-    unusable = "".join(row["why"] for row in report if row["list"] == "nothing usable")
+    useless = [row for row in report if row["list"] == "nothing usable"]
+    unusable = "".join(row["why"] for row in useless)
     for row in report:
         what, student = row["what"], row["what"].removesuffix(f", {name}")
         named = {each for each in sets if each in f"{what} {row['why']}".casefold()}
         if row["list"] == "missing" and student != what and student not in students:
+            if student in {each["what"] for each in useless}:
+                continue  # this student has a row of the other kind
             yield student, "no file was collected"
         elif named and name not in named:
             continue

@@ -17,7 +17,7 @@ from tiny_set import write_tiny_set
 
 from rbclassroom.assignments import downloads
 from rbclassroom.assignments.__main__ import main
-from rbclassroom.assignments.collect import collect
+from rbclassroom.assignments.collect import collect, read_owners
 from rbclassroom.assignments.submissions import read_notebook
 
 DAY = (2026, 11, 20, 12, 0, 0)
@@ -573,3 +573,21 @@ def test_the_command_prints_each_list(course, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
     with pytest.raises(SystemExit, match="folder: an existing folder is wanted, got nowhere"):
         main()
+
+
+def test_a_roster_that_comes_later_renames_the_folder(course):
+    """The student handed in before, and had a folder with an own name."""
+    entries = {
+        moodle("Ada Lovelace_1001"): answered(course),
+        moodle("Paul_7", "a.pdf"): b"%PDF-1.7",
+    }
+    collected(course, {"all.zip": packed(entries)})
+    assert files(course).keys() == {"ada_lovelace/ps1"}
+    roster = "id,first_name,last_name\ns1,Ada,Lovelace\ns3,,Paul\n"
+    (course / "students.csv").write_text(roster, "utf-8")
+    rows = collected(course, {})
+    assert of("renamed", rows) == [("submitted/ada_lovelace/ps1", "is s1, ps1")]
+    assert [who for who, _ in of("nothing usable", rows)] == ["s3"]
+    assert files(course).keys() == {"s1/ps1"}
+    assert read_owners(course) == {"s1/ps1": ("1001", "Ada Lovelace")}
+    assert of("renamed", collected(course, {})) == []

@@ -1,5 +1,7 @@
 """A class of submissions is graded in one run, and no submission affects another."""
 
+import csv
+import json
 import os
 import re
 import shutil
@@ -203,6 +205,8 @@ LISTED = [
     ("nothing usable", "Fay 4", "F_4_assignsubmission_file_/a.pdf: it is neither a notebook nor"),
     ("nothing usable", "Gus 5", "G_5_assignsubmission_file_/ps0.ipynb: it is empty"),
     ("refused", "G_5_assignsubmission_file_/ps0.ipynb", "it is empty"),
+    ("nothing usable", "ivo", "I_8_assignsubmission_file_/a.pdf: it is neither a notebook nor"),
+    ("missing", "ivo, ps0", "Ivo Ist"),
     ("nothing usable", "Hal 6", "H_6_assignsubmission_file_/ps1.ipynb: it is empty"),
     ("missing", "cid, ps0", "Cid Cole"),
     ("missing", "tampers, ps0", "Ann Ames"),
@@ -235,6 +239,8 @@ def again(tmp_path_factory, course):
     (again.folder / "source" / "ps1").mkdir()
     rows = [dict(zip(("list", "what", "why"), line, strict=True)) for line in LISTED]
     write_csv(again.folder / "submitted" / "report.csv", rows)
+    owners = {"tampers/ps0": ["4711", "Ann Ames"], "stuck/ps0": "12"}
+    (again.folder / "submitted" / "owners.json").write_text(json.dumps(owners))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grading, "ProcessPoolExecutor", Killed)
         grade(["ps0"], again.folder, without_box=True)
@@ -270,7 +276,13 @@ def test_the_table_lists_students_who_were_not_graded(again):
         "cid": "no file was collected",
         "Fay 4": f"nothing usable was handed in: {LISTED[3][2]}",
         "Gus 5": f"nothing usable was handed in: {LISTED[4][2]}",
+        "ivo": f"nothing usable was handed in: {LISTED[6][2]}",
     }
+    with (again.folder / "ps0-grades.csv").open(encoding="utf-8-sig") as table:
+        lines = list(csv.reader(table))
+    assert lines[0][:3] == ["student", "number", "name"]
+    assert ["tampers", "4711", "Ann Ames"] in [line[:3] for line in lines]
+    assert len(lines) == len(again.rows()) + 1
 
 
 def test_alembic_is_found_without_an_activated_environment(monkeypatch):
