@@ -540,6 +540,19 @@ def test_a_curve_keeps_the_contract(make, clause):
         clause(make)
 
 
+def test_the_forms_that_the_course_compares_have_the_same_arguments_and_different_first_words():
+    forms = rb.closed_forms.FORMS
+    assert len({name.partition("_")[0] for name in forms}) == len(forms)
+    for name, make in forms.items():
+        parameters = inspect.signature(make).parameters.values()
+        needed = [
+            p.name for p in parameters if p.default is p.empty and p.kind is not p.KEYWORD_ONLY
+        ]
+        positional = [p.name for p in parameters if p.kind is not p.KEYWORD_ONLY]
+        assert positional[:4] == ["start", "goal", "v0", "v1"], name
+        assert set(needed) <= {"start", "goal", "v0", "v1"}, name
+
+
 def test_every_function_that_returns_a_curve_is_tested():
     """Functions of paths and of curves have tests of their own: `test_paths.py` and others."""
     for module in (rb, rb.closed_forms):

@@ -41,7 +41,7 @@ def minutes(word):
     return sum(there[ORDER.index(which) if which else 0].values())
 
 
-@pytest.mark.parametrize("route", ROUTES[:3], ids=["2 lectures", "4 hours", "12 hours"])
+@pytest.mark.parametrize("route", ROUTES[:4], ids=["2 × 50", "2 × 90", "4 hours", "12 hours"])
 def test_the_minutes_of_a_route_follow_from_the_run_sheets(route):
     total = 0
     for word, stated, without in re.findall(r"^\| (\d\d.*?) \| (\d+) \|(.*)\|$", route, re.M):
@@ -55,14 +55,14 @@ def test_the_minutes_of_a_route_follow_from_the_run_sheets(route):
 
 def test_the_minutes_of_a_term_are_those_of_its_sessions():
     total, taught = 0, []
-    for words, stated in re.findall(r"^\| \d+ – \d+ \| (.*) \| (\d+) \|$", ROUTES[3], re.M):
+    for words, stated in re.findall(r"^\| \d+ – \d+ \| (.*) \| (\d+) \|$", ROUTES[4], re.M):
         assert int(stated) == sum(map(minutes, words.split("; ")))
         total, taught = total + int(stated), taught + words.split("; ")
-    assert f"Total: {total} minutes." in ROUTES[3]
+    assert f"Total: {total} minutes." in ROUTES[4]
     assert {word[:2] for word in taught if word[0] != "p"} == set(LESSONS) - {"00"}
     assert len(taught) == 28
 
 
 def test_the_four_hours_end_at_figure_5():
-    assert re.findall(r"^\| (\d\d)", ROUTES[1], re.M)[-1] == "10"
-    assert "Total: 240 minutes." in ROUTES[1]
+    assert re.findall(r"^\| (\d\d)", ROUTES[2], re.M)[-1] == "10"
+    assert "Total: 240 minutes." in ROUTES[2]

@@ -75,6 +75,14 @@ def test_exp_and_log_agree_with_mpmath():
     assert np.all((off <= 4 * EPS * size) | (size >= 1e-6))
 
 
+def test_each_entry_of_a_small_rotation_is_accurate():
+    """The squares of small angles are below the rounding error of 1 − cos a."""
+    for a in (1e-3, 1e-5, 1e-8):
+        w = a * np.array([0.6, 0, 0.8])
+        R, right = rb.exp_so3(w), oracles.exp_so3(w)
+        assert abs(R[0, 2] / right[0, 2] - 1) < 8 * EPS  # (1 − cos a) n₀ n₂
+
+
 def test_exp_of_huge_vectors_is_a_rotation_until_their_norm_overflows():
     """For huge angles a, (1 − cos a)/a and (sin a)/a vanish in the Jacobian, and n̂² + I is n
     nᵀ."""

@@ -187,7 +187,9 @@ def _vectors(R: Array) -> tuple[Array, Array]:
     return base, x
 
 
-def _with_differences(curve: Smooth, h: float = 1e-4) -> Smooth:
+def _with_differences(curve: Smooth) -> Smooth:
+    h = 1e-4  # s
+
     def whole(t: Array, order: int = 0) -> Array:
         if order < 2:
             return curve(t, order)

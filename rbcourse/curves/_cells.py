@@ -510,7 +510,10 @@ def _first_x(wanted: float, low: float, high: float) -> float:
 
 
 def _largest(ellipses: list[list[float]], y: float) -> float:
-    """Return the largest x that all limits of a cell allow for a given y."""
+    """Return the largest x that all limits of a cell allow for a given y.
+
+    `_can_rise` has the same formula for arrays, which takes longer for one cell.
+    """
     x = inf
     for A, B, C, D, E, F in ellipses:
         # the limit is A x² + 2 t x + G ≤ 0

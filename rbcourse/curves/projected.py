@@ -54,6 +54,7 @@ class ProjectedPolynomial(Curve):
         """Return R, w and w' of one curve at one time, as `textbook.projected_cubic` does."""
         if max(orders) > 2:
             return super().single(i, t, orders)
+        # the formulas of `_rates` without stacks take a third of the time
         ends = self.flat.ends[i]
         M = [hermite(ends, t, k) for k in range(max(orders) + 1)]
         R, unique = nearest(M[0])

@@ -57,7 +57,7 @@ from rbcourse.so3 import log
 NOTHING = Failure(np.inf, 0)
 
 
-class Limits:
+class Thresholds:
     """The thresholds. Ratios are costs divided by the lowest cost; angles are in rad.
 
     In brackets: another value, and how many optima it misses of 2,880 balls, of 900 bodies
@@ -90,7 +90,7 @@ class Limits:
     last = Steps(200, 0.0)  # used if the other steps do not suffice [40: 0]
 
 
-LIMITS = Limits()
+LIMITS = Thresholds()
 
 
 class Task(NamedTuple):

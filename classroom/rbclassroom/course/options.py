@@ -21,6 +21,15 @@ def repository(text: str) -> str:
     return text
 
 
+def date(text: str) -> datetime:
+    """Return a date with a time, or refuse it."""
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        wanted = 'a date such as "2026-12-01 23:59" is wanted'
+        raise argparse.ArgumentTypeError(f"{wanted}, got {text}") from None
+
+
 def parser(task: str, purpose: str = "") -> argparse.ArgumentParser:
     """Return the parser of a task; its help states the purpose of the task."""
     made = argparse.ArgumentParser(
@@ -48,7 +57,7 @@ def parser(task: str, purpose: str = "") -> argparse.ArgumentParser:
         add("--solutions", action="store_true", help="write the model answers instead")
     elif task == "collect":
         add("folder", type=Path, help="the folder with the downloads from Moodle or Canvas")
-        add("--due", type=datetime.fromisoformat, help='such as "2026-12-01 23:59"')
+        add("--due", type=date, help='such as "2026-12-01 23:59"')
     elif task == "grade":
         add("sets", nargs="*", metavar="set", help="such as ps1; by default all sets")
         risk = "grade even if there is no sandbox: submissions can then do all that you can do"

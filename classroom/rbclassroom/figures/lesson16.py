@@ -33,9 +33,9 @@ def hand() -> Curve:
     return rb.minimum_jerk_spline(np.arange(len(R)), R, "rest")
 
 
-def speeds(curves: dict[str, Curve], order: Literal[1, 2], samples: int = 1601) -> Table:
+def speeds(curves: dict[str, Curve], order: Literal[1, 2]) -> Table:
     """Return the norms of w (order 1) or w' (order 2) of curves on SO(3), to four decimals."""
-    t = np.linspace(*next(iter(curves.values())).domain, samples)
+    t = np.linspace(*next(iter(curves.values())).domain, 1601)
     unit = " [rad/s]" if order == 1 else " [rad/s²]"
     norms = {name: np.linalg.norm(c(t, order), axis=1) for name, c in curves.items()}
     found = {name + unit: np.round(x, 4) for name, x in norms.items()}

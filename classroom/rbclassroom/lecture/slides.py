@@ -100,6 +100,9 @@ class _Reader:
         """Add the verdict of the last poll: the right option is not an item of the list."""
         poll = next(slide for slide in reversed(self.shown) if slide.kind == "poll")
         for item, letter, idea in _ITEM.findall(text):
+            if letter not in poll.options:
+                listed = ", ".join(poll.options)
+                raise ValueError(f"slides: {poll.poll} has the options {listed}, got **{letter}**")
             poll.ideas[letter] = idea
             poll.right = poll.right if item else letter
         self.put(replace(poll, kind="verdict", notes=[]))

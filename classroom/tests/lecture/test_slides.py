@@ -99,6 +99,13 @@ def test_a_text_without_a_cell_is_refused(tmp_path, texts, wrong):
         deck_of(path)
 
 
+@pytest.mark.parametrize("verdict", ["**E** All.\n\n- **A** None.", "**A** All.\n\n- **F** None."])
+def test_a_verdict_on_an_option_that_the_poll_does_not_have_is_refused(tmp_path, verdict):
+    poll = text("### Poll 1\n\nHow many?\n\n- **A** one\n- **B** two")
+    with pytest.raises(ValueError, match=r"Poll 1 has the options A, B, got \*\*[EF]\*\*"):
+        tiny(tmp_path, poll, text("Answer.", verdict))
+
+
 def test_a_picture_is_shown_with_the_text_of_its_cell(tmp_path):
     deck = tiny(
         tmp_path,

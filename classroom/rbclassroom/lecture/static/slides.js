@@ -149,7 +149,7 @@ const begin = async () => {
   }
   await Reveal.initialize({
     width: 1920, height: 1080, margin: 0, minScale: 0.1, maxScale: 4, center: false, display: "flex",
-    progress: false, controls: false, hash: true, slideNumber: numbered, navigationMode: "linear",
+    progress: false, controls: false, hash: true, slideNumber: numbered, jumpToSlide: false, navigationMode: "linear",
     transition: "none", backgroundTransition: "none", pdfSeparateFragments: false, pdfMaxPagesPerSlide: 1,
     totalTime: 50 * 60, plugins: [RevealNotes],
     keyboardCondition: (event) => !event?.target?.closest?.("figure, .panel"), // a slider uses keys itself
