@@ -383,3 +383,20 @@ def test_very_uneven_times_give_a_minimum_or_an_error():
         return
     assert c.definite
     assert off(c.jumps(2), c(t, 2)) < 1e-9
+
+
+@pytest.mark.parametrize("size", [0, 1e-13, 1e-9, 1e-7, 1e-5, 1e-3])
+@every_spline
+def test_a_spline_of_tiny_turns_is_the_cubic_spline_of_rotation_vectors(name, size):
+    """A gripper that keeps its orientation has the size 0; the legs have different durations."""
+    rng = np.random.default_rng(7)
+    for count, spread in ((3, 0.3), (4, 1.5), (8, 0.3)):
+        t = np.cumsum(10 ** rng.uniform(-spread, spread, count))
+        x = size * rng.normal(size=(count, 3))
+        R = rb.sample_rotation(rng=rng) @ rb.exp_so3(x)
+        for ends, kind in (("rest", "clamped"), ("natural", "natural")):
+            c = NATURAL[name](t, R, ends)
+            assert getattr(c, "certified", True)
+            if name != "jerk":
+                w = CubicSpline(t, x, bc_type=kind)(t, 1)
+                assert np.abs(c.velocities - w).max() <= 20 * size**2 + 1e-11

@@ -55,9 +55,14 @@ STEPS = 20  # of Newton's method; then it has failed
 SHORT = 1e-5  # rad: a result is accepted after a step shorter than this
 WORTHLESS = 1e-22  # a step is not needed if it lowers the cost by less than this share of it
 ROUNDING = 1e-26  # and this share of the terms of the system, whose momenta have rounding errors
+NOTHING = (
+    1e-12  # rad: after a step that turns no node by more, only rounding errors are left [2e-13]
+)
+STANDS = 1e-12  # rad: rounding errors of η at the nodes, which a start's cost has [3e-13]
 TOLERANCE = 1e-4  # a minimum may cost more than its start by this share
 FLAT = 1e-9  # eigenvalues below this share of the diagonal may be 0
 SHIFTS = 0.0, *(4.0**k for k in range(-3, 10))  # multiples of the diagonal that are added to it
+NEARLY_FLAT = 0.1  # rad: below, the cost is nearly quadratic, and has one minimum
 ON_AXIS = 1e-6  # a curve is about one axis if rotation vectors have a smaller part across it
 BEND = np.array([0.4, 0.6, 0.8])  # rad: the turn by which a curve leaves its axis in mid-leg
 DESCENTS = 1e-2, 1e-4, 1e-6
@@ -146,7 +151,10 @@ def solve_spline(problem: Problem, R: Array) -> Found | Failure:
 
 
 def _about_one_axis(R: Array) -> bool:
+    """Tell whether a curve that is large enough to leave its axis turns about one axis."""
     turns = log(R[0, 0].T @ R)
+    if np.linalg.norm(turns, axis=-1).max() < NEARLY_FLAT:
+        return False
     rank = np.linalg.matrix_rank(turns.reshape(-1, 3), rtol=ON_AXIS)
     return bool(rank < 2)
 
@@ -182,8 +190,8 @@ def _searched(problem: Problem, R: Array, descents: Sequence[float | None]) -> F
         found: Found | Failure = Failure(np.inf, STEPS)
         with suppress(FloatingPointError, np.linalg.LinAlgError):
             found = _newton(problem, R)
-        most = bound * (1 + TOLERANCE)
-        if isinstance(found, Found) and found.shift <= FLAT and found.cost < most:
+        most = (1 + TOLERANCE) * (np.sqrt(bound) + np.sqrt(problem.total(STANDS**2))) ** 2
+        if isinstance(found, Found) and found.shift <= FLAT and found.cost <= most:
             return found
     if isinstance(found, Found):
         return Failure(found.legs[0].residual, STEPS)
@@ -233,7 +241,7 @@ def _newton(problem: Problem, R: Array) -> Found | Failure:
         if max(legs.left, legs.tail) < EXACT and turned < SHORT:
             solutions = legs.solutions(step)
             cost = problem.total([one.cost for one in solutions])
-            if not _lowers(change, system, values, cost):
+            if turned < NOTHING or not _lowers(change, system, values, cost):
                 shift, _ = minimum(system, problem.ends, (-FLAT, FLAT, *SHIFTS[1:]))
                 return Found(legs.unknowns.R, values, solutions, cost, shift)
         of_legs = combined(responses, problem.own(change).reshape(len(problem.h), -1))
