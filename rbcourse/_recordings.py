@@ -67,15 +67,21 @@ A group "axis" is a part of the meaning. Between p or q and the axis, EuRoC has 
 """
 _OTHER = re.compile(
     r"(.*_)?(std|stddev|err|error|cov|covariance|var|variance|sigma|vel|velocity|rate|linear|angular"
-    r"|acc|accel|acceleration|twist|gyro|mag)(_.*)?"
+    r"|acc|accel|acceleration|twist|gyr|gyro|mag)(_.*)?"
 )
 """Names of columns that hold no pose, although they may contain the name of an axis."""
+_AXIS = re.compile(
+    r"(^|[\W_])[xyzXYZ]\d*([\W_]|$)|(?<=[a-z])[XYZ](m|cm|mm)?(?![a-z])|^[xyz](pos|loc)|(pos|loc)[xyz]"
+)
+"""Names of columns that may hold a position, such as x1, posX, CameraX, or xpos."""
 _ORDER = re.compile(
     r"\b(q_?[0-3wxyz]|r[wxyz]|w[\s,]*x[\s,]*y[\s,]*z|x[\s,]*y[\s,]*z[\s,]*w)\b", re.I
 )
 """Words in a comment that may tell the order of a quaternion."""
 _BODIES = "child_frame_id", "frame_id", "device_id", "vehiclename", "vehicle", "body", "object"
-"""Names of columns that tell which of several bodies a row belongs to."""
+_COUNTERS = "id", "name"
+"""Names of columns that tell which of several bodies a row belongs to; in each row of one body, the
+last two may have another value."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _MISSING = {"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"}
 _MISSING |= {"-nan(ind)", "1.#qnan"}
@@ -361,6 +367,11 @@ def _meaning(name: str) -> tuple[str | None, str | None]:
     return None, None
 
 
+def _words(name: str) -> list[str]:
+    """Return the words of a name such as accX or acc_x."""
+    return re.findall(r"[^\W_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+
+
 def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     """Return the columns that have known names, the unit of time, and the lengths in a metre."""
     found: dict[str, list[int]] = {}
@@ -381,12 +392,8 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
             raise ValueError(f"{rows.file}: {names} both name a column of {meaning}; rename one")
     read = {i for places in found.values() for i in places}
     others = [name for i, name in enumerate(rows.names) if i not in read]
-    axes = [name for name in others if re.search(r"(^|[\W_])[xyz]([\W_]|$)", name, re.I)]
-    axes = [
-        name
-        for name in axes
-        if not _OTHER.fullmatch("_".join(re.findall(r"[^\W_]+", name.lower())))
-    ]
+    others = [name for name in others if not _OTHER.fullmatch("_".join(_words(name)))]
+    axes = list(filter(_AXIS.search, others))
     wanted = list(QUATERNION)
     wanted += POSITION if axes or found.keys() & set(POSITION) else []
     velocities = list(VELOCITIES.values())[: 6 if "x" in found else 3]
@@ -398,6 +405,8 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
             "and give format=, or use numpy.loadtxt and pose_from_components. The names "
             f"are {', '.join(rows.names)[:300]!r}"
         )
+    if "x" not in found and others:
+        _LOG.warning("%s: rotations without positions; not read: %s", rows.file, ", ".join(others))
     lengths = {units[name] or "m" for name in POSITION if name in found} or {"m"}
     if len(lengths) > 1 or not lengths <= LENGTHS.keys():
         raise ValueError(f"{rows.file}: positions in m, cm or mm are wanted, got {lengths}")
@@ -473,9 +482,9 @@ def _check_times(rows: _Rows, columns: Columns, timed: bool) -> None:
 def _check_one_body(rows: _Rows) -> None:
     """Refuse rows of several bodies, such as frames of ROS."""
     for i, name in enumerate(rows.names):
-        if name.lower().rpartition(".")[2] in _BODIES:
+        if name.lower().rpartition(".")[2] in (*_BODIES, *_COUNTERS):
             values = {text.split(rows.separator)[i].strip() for text in rows.texts}
-            if len(values) > 1:
+            if len(values) > 1 and (name.lower() not in _COUNTERS or len(values) < len(rows.texts)):
                 some = ", ".join(sorted(values)[:3])
                 raise ValueError(
                     f"{rows.file}: {name} has several values ({some}); keep the rows of one"
@@ -521,6 +530,13 @@ def _stamps(rows: _Rows, kept: Sequence[int], columns: Columns, unit: str) -> li
     stamps = column_of(columns["time"], DIGITS[unit])
     if "nanoseconds" in columns:  # after whole seconds
         parts = column_of(columns["nanoseconds"], 9)
+        for i, whole, part in zip(kept, stamps, parts, strict=True):
+            if whole % 1 or not 0 <= part < 1:
+                raise ValueError(
+                    f"{rows.place(i)}: whole seconds, and nanoseconds below 1e9, are wanted in the "
+                    f"columns of the times, got {_short(whole)} s and {1e9 * float(part):.12g} ns; "
+                    "delete the name of one of them"
+                )
         stamps = [EXACT.add(whole, part) for whole, part in zip(stamps, parts, strict=True)]
     return stamps
 
@@ -548,8 +564,9 @@ def _given_times(
 def _check_unit(place: str, stamps: Sequence[Decimal], known: str | None, sure: bool) -> None:
     """Refuse times whose unit is not s, or not the unit that is known.
 
-    Times are not in s after the year 5000, with steps of a quarter of an hour, or, in recordings of
-    ten poses or more, with whole steps of 5 or more. Steps below 1 µs belong to another unit.
+    Times are not in s after the year 5000, or with steps of a quarter of an hour. They may be in
+    another unit if ten poses or more have steps of 1 or more, and do not begin between 1990 and
+    2090. Steps below 1 µs belong to another unit.
     """
     times = np.array(stamps, dtype=float)
     first, step = abs(times[0]), np.median(np.abs(np.diff(times))) if len(times) > 1 else 0.0
@@ -560,10 +577,8 @@ def _check_unit(place: str, stamps: Sequence[Decimal], known: str | None, sure: 
                 "gives another unit"
             )
         return
-    whole = (
-        len(stamps) > 9 and step >= 5 and all(stamp.as_tuple().exponent == 0 for stamp in stamps)
-    )
-    if not (first >= 1e11 or step >= 1e3 or whole):
+    unclear = len(stamps) > 9 and step >= 1 and not 6e8 < first < 4e9
+    if not (first >= 1e11 or step >= 1e3 or unclear):
         return
     since_1990 = [unit for unit, digits in DIGITS.items() if 6e8 < first / 10.0**digits < 4e9]
     likely = [unit for unit, digits in DIGITS.items() if 1e-4 <= step / 10.0**digits <= 3]

@@ -404,3 +404,60 @@ def test_a_curve_is_written_with_its_velocities_and_accelerations(tmp_path):
         with pytest.raises(ValueError, match=f"^{message}"):
             rb.write_path(tmp_path / "b.csv", *arguments)
         assert not (tmp_path / "b.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("names", "stamp", "message"),
+    [
+        ("time,nanoseconds", "1500000000", "nanoseconds below 1e9, are wanted"),
+        ("time,nsec", "0", "whole seconds"),
+        ("t,id", "{i}", "id has several values"),
+    ],
+)
+def test_columns_that_contradict_each_other_are_refused(tmp_path, names, stamp, message):
+    rows = [f"{0.5 * i},{stamp.format(i=i // 2)},1,2,3,0.5,0.5,0.5,0.5" for i in range(4)]
+    file = tmp_path / "odd.csv"
+    file.write_text("\n".join([f"{names},x,y,z,qw,qx,qy,qz", *rows, ""]))
+    with pytest.raises(ValueError, match=message):
+        rb.read_path(file)
+
+
+def test_an_id_of_each_row_is_no_body(tmp_path):
+    rows = [f"{i},{0.5 * i},1,2,3,0.5,0.5,0.5,0.5" for i in range(4)]
+    (tmp_path / "id.csv").write_text("\n".join(["id,time,x,y,z,qw,qx,qy,qz", *rows, ""]))
+    assert len(rb.read_path(tmp_path / "id.csv")[0]) == 4
+
+
+@pytest.mark.parametrize("step", ["10.0", "8.333", "4", "1.0"])
+def test_steps_of_a_second_or_more_need_a_unit(tmp_path, step):
+    """In seconds since 1970, such steps are those of keyframes."""
+    file, rows = tmp_path / "slow.txt", [f"{i * float(step)!r} 1 2 3 0 0 0 1" for i in range(12)]
+    file.write_text("\n".join([*rows, ""]))
+    with pytest.raises(ValueError, match=r"unit='ms'.* unit='s' reads them as they are"):
+        rb.read_path(file)
+    assert rb.read_path(file, unit="ms")[0][1] == pytest.approx(float(step) / 1e3)
+    assert rb.read_path(file, unit="s")[0][1] == pytest.approx(float(step))
+    rows = [f"{1.7e9 + i * float(step)!r} 1 2 3 0 0 0 1" for i in range(12)]
+    file.write_text("\n".join([*rows, ""]))
+    assert rb.read_path(file, start="first")[0][1] == pytest.approx(float(step))
+
+
+@pytest.mark.parametrize(
+    "names", ["xpos,ypos,zpos", "posXm,posYm,posZm", "x1,y1,z1", "CameraX,CameraY,CameraZ"]
+)
+def test_positions_with_other_names_are_not_dropped(tmp_path, names):
+    file = tmp_path / "names.csv"
+    rows = [f"{0.5 * i},1,2,3,0.5,0.5,0.5,0.5" for i in range(4)]
+    file.write_text("\n".join([f"time,{names},qw,qx,qy,qz", *rows, ""]))
+    with pytest.raises(ValueError, match="no column has the name x or y or z"):
+        rb.read_path(file)
+
+
+def test_columns_that_are_not_read_are_named_if_there_is_no_position(tmp_path, caplog):
+    rows = [f"{0.5 * i},1,2,3,0.5,0.5,0.5,0.5" for i in range(4)]
+    for names, said in (("north,east,down", True), ("AccX,accY,acc_z", False)):
+        file = tmp_path / "names.csv"
+        file.write_text("\n".join([f"time,{names},qw,qx,qy,qz", *rows, ""]))
+        assert rb.read_path(file)[1].shape == (4, 3, 3)
+        assert ("not read: north, east, down" in caplog.text) == said
+        caplog.clear()
