@@ -14,8 +14,9 @@ join two rotations or poses                  geodesic, screw, projected_line, pr
 join them with the least cost                minimum_acceleration, minimum_torque, minimum_jerk
 state the velocities of poses                twist_from_rates
 state which body moves                       Body(inertia, mass, centre), Body.box(sides, mass)
-pass through many poses with continuous      projected_spline (for any body), quaternion_spline;
-acceleration                                 joined, for a rotation and a position
+pass through many poses with continuous      projected_spline (for any body), quaternion_spline if
+acceleration                                 legs turn by more than 90°; joined, for a rotation and
+                                             a position
 join them with given velocities              chain
 pass near noisy poses                        smoothing_spline, or with the least cost
                                              optimum.minimum_acceleration_smoothing
