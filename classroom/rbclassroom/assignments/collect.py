@@ -120,7 +120,7 @@ def read_owners(assignments: Path) -> dict[str, tuple[str, str]]:
 
 
 def _move(old: Path, new: Path) -> Row:
-    """Move what was collected under another name, before the student was on the roster."""
+    """Move a folder that was collected before the student was on the roster."""
     who = f"{new.parent.name}, {new.name}"
     if new.exists() or not old.exists():
         why = f"the same student as {who}; delete this folder if it is there"

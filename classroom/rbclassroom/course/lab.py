@@ -86,7 +86,8 @@ def main() -> None:
         words.append("--allow-root")
     paths = [str(configured), os.environ.get("JUPYTER_CONFIG_PATH")]
     os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(filter(None, paths))
-    print("JupyterLab opens in the browser. To stop it, press Ctrl-C here.", flush=True)
+    where = "at the address below" if "--no-browser" in words else "in the browser"
+    print(f"JupyterLab opens {where}. To stop it, press Ctrl-C here.", flush=True)
     # JupyterLab causes these warnings, because it reads its configuration twice
     warnings.filterwarnings("ignore", category=DeprecationWarning)
     warnings.filterwarnings("ignore", "Overriding existing pre_save_hook")

@@ -102,7 +102,7 @@ def spline_explorer() -> Explorer:
 
 @lru_cache(maxsize=64)
 def _two_splines(ends: str, pitch: float, third: float) -> tuple[Any, ...]:
-    """Return times and rotations, what is drawn of each curve, and costs divided by the least."""
+    """Return times and rotations, the drawn data of each curve, and costs divided by the least."""
     times, angles = np.array([0, 1, third, 4]), ANGLES.copy()
     angles[2, 1] = pitch
     R = rb.matrix_from_zyx(np.radians(angles))
