@@ -9,6 +9,7 @@ import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
 from decimal import Context, Decimal
+from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -74,6 +75,13 @@ _AXIS = re.compile(
     r"(^|[\W_])[xyzXYZ]\d*([\W_]|$)|(?<=[a-z])[XYZ](m|cm|mm)?(?![a-z])|^[xyz](pos|loc)|(pos|loc)[xyz]"
 )
 """Names of columns that may hold a position, such as x1, posX, CameraX, or xpos."""
+_PART_OF_TIME = re.compile(r"(.*_)?([munµ]s|[munµ]?secs?|(milli|micro)sec(ond)?s?|mins?|minutes)")
+"""Names of columns that hold a part of the time, beside a column of seconds."""
+_KIND = re.compile(
+    r"pose|pos|position|trans|translation|location|quat|quaternion|orientation|rot|rotation"
+    r"|attitude|p|q|(t|p|q|pos|rot|quat)?[wxyz]"
+)
+"""Words in the names of columns that do not name a body or a frame."""
 _ORDER = re.compile(
     r"\b(q_?[0-3wxyz]|r[wxyz]|w[\s,]*x[\s,]*y[\s,]*z|x[\s,]*y[\s,]*z[\s,]*w)\b", re.I
 )
@@ -372,6 +380,12 @@ def _words(name: str) -> list[str]:
     return re.findall(r"[^\W_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
 
 
+def _body(name: str) -> str:
+    """Return the first word in the name of a column that is not the kind of its number, or ""."""
+    words = _words(re.sub(r"[\[(].*", "", name))
+    return next((word for word in words if not _KIND.fullmatch(word) and word not in _UNITS), "")
+
+
 def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     """Return the columns that have known names, the unit of time, and the lengths in a metre."""
     found: dict[str, list[int]] = {}
@@ -393,6 +407,17 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     read = {i for places in found.values() for i in places}
     others = [name for i, name in enumerate(rows.names) if i not in read]
     others = [name for name in others if not _OTHER.fullmatch("_".join(_words(name)))]
+    if parts := [name for name in others if _PART_OF_TIME.fullmatch("_".join(_words(name)))]:
+        raise ValueError(
+            f"{rows.file}: {parts[0]} may be a part of the time; write the whole time in one column"
+        )
+    of_pose = [rows.names[found[x][0]] for x in (*QUATERNION, *POSITION) if x in found]
+    for one, other in pairwise(of_pose):
+        if (bodies := (_body(one), _body(other))) and all(bodies) and bodies[0] != bodies[1]:
+            raise ValueError(
+                f"{rows.file}: {other} and {one} may be of two bodies or frames; rename those of "
+                "one body to x, y, z, qw, qx, qy, qz"
+            )
     axes = list(filter(_AXIS.search, others))
     wanted = list(QUATERNION)
     wanted += POSITION if axes or found.keys() & set(POSITION) else []

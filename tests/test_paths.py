@@ -118,7 +118,7 @@ def test_a_repeated_pose_is_an_ordinary_pose(poses):
     assert rb.acceleration_cost(c) == pytest.approx(rb.acceleration_cost(near), rel=1e-7)
 
 
-@pytest.mark.parametrize("rest_at", ["pauses", [9], [-10], [1.0], 3, [[1]]])
+@pytest.mark.parametrize("rest_at", ["pauses", [9], [-10], [1.0], 3, [[1]], [False, True]])
 def test_a_wrong_request_for_a_rest_is_refused(rest_at):
     with pytest.raises(ValueError, match="rest_at: indices"):
         rb.projected_spline(TIMES, POSES, rest_at=rest_at)

@@ -412,6 +412,9 @@ def test_a_curve_is_written_with_its_velocities_and_accelerations(tmp_path):
         ("time,nanoseconds", "1500000000", "nanoseconds below 1e9, are wanted"),
         ("time,nsec", "0", "whole seconds"),
         ("t,id", "{i}", "id has several values"),
+        ("sec,usec", "900000", "usec may be a part of the time"),
+        ("secs,msec", "5", "msec may be a part"),
+        ("min,sec", "5", "min may be a part"),
     ],
 )
 def test_columns_that_contradict_each_other_are_refused(tmp_path, names, stamp, message):
@@ -420,6 +423,23 @@ def test_columns_that_contradict_each_other_are_refused(tmp_path, names, stamp, 
     file.write_text("\n".join([f"{names},x,y,z,qw,qx,qy,qz", *rows, ""]))
     with pytest.raises(ValueError, match=message):
         rb.read_path(file)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "head_pos_x,head_pos_y,head_pos_z,hand_rot_w,hand_rot_x,hand_rot_y,hand_rot_z",
+        "a_pos_x,a_pos_y,b_pos_z,qw,qx,qy,qz",
+        "target.position.x,target.position.y,target.position.z,pose.orientation.w,"
+        "tool.orientation.x,tool.orientation.y,tool.orientation.z",
+        "p_WC_x,p_WC_y,p_WC_z,q_CW_w,q_CW_x,q_CW_y,q_CW_z",
+    ],
+)
+def test_numbers_of_two_bodies_are_not_one_pose(tmp_path, names):
+    rows = [f"{0.5 * i},1,2,3,0.5,0.5,0.5,0.5" for i in range(4)]
+    (tmp_path / "two.csv").write_text("\n".join([f"time,{names}", *rows, ""]))
+    with pytest.raises(ValueError, match="may be of two bodies or frames"):
+        rb.read_path(tmp_path / "two.csv")
 
 
 def test_an_id_of_each_row_is_no_body(tmp_path):

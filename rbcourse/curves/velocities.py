@@ -225,6 +225,8 @@ def as_ends(
     """Return the end conditions for `count` knots, with `size` values at each."""
     fixed, given = np.zeros(count, bool), np.zeros((count, size))
     try:
+        if any(isinstance(i, bool) for i in rest_at):
+            raise TypeError("a mask is not a list of indices")
         fixed[[index(i) for i in rest_at]] = True
     except (TypeError, IndexError) as error:
         raise ValueError(
