@@ -86,10 +86,10 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
             plain = [_plain(each) for each in same]
             apart = len({*plain}) == len(plain)
             who = f"{student}_{_plain(number) if apart else same.index(number) + 1}"
-        for place in [key for key, known in before.items() if owner[0] and known == owner]:
-            if place.endswith(f"/{name}") and place != f"{who}/{name}":
-                rows.append(_move(submitted / place, submitted / who / name))
-                del before[place]
+        for key in [key for key, known in before.items() if owner[0] and known == owner]:
+            if key.endswith(f"/{name}") and key != f"{who}/{name}":
+                rows.append(_move(submitted / key, submitted / who / name))
+                del before[key]
         before[f"{who}/{name}"] = owner
         rows += [("duplicates", other.file, f"{best.file} is used instead") for other in others]
         rows.append(_take(best, submitted / who / name))
