@@ -84,11 +84,13 @@ def _find_set(notebook: NotebookNode, folder: Path) -> tuple[str, dict[str, byte
             return names[0], {p.relative_to(place).as_posix(): p.read_bytes() for p in paths}
     course = Path("notebooks", "assignments")
     sources = [path for path in course.glob("*/*/*.ipynb") if path.stem == path.parent.name]
+    try:
+        from rbclassroom.assignments.handout import release  # this needs nbgrader
+    except ImportError:
+        sources = []
     if not sources:
-        missing = "the folder original of the handout is missing"
+        missing = "the folder original of the handout is missing beside the notebook"
         raise ValueError(f"{missing}; unpack the handout again, and work in its folder")
-    from rbclassroom.assignments.handout import release  # this needs nbgrader
-
     shared = {path: count_found(notebook, nbformat.read(path, 4)) for path in sources}
     best = max(sources, key=lambda path: shared[path])
     return best.name, release(best.stem, course)

@@ -56,7 +56,8 @@ def regenerate(lessons: Path, figures: Path, names: Sequence[str] = ()) -> None:
     if not every:
         raise ValueError(f"{lessons} has no lessons; run this in the folder of the course")
     if unknown := [name for name in names if not any(p.stem.startswith(name) for p in every)]:
-        raise ValueError(f"names: prefixes of lessons' names are wanted, got {unknown[0]!r}")
+        known = f"{every[0].stem[:2]} to {every[-1].stem[:2]}"
+        raise ValueError(f"names: numbers of lessons, {known}, are wanted, got {unknown[0]!r}")
     chosen = [path for path in every if not names or path.stem.startswith(tuple(names))]
     with tempfile.TemporaryDirectory() as folder:
         texts = asyncio.run(_executed(chosen, Path(folder)))

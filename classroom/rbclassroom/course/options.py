@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
-FURTHER = {"lab": "JupyterLab", "test": "pytest"}
+FURTHER = {"lab": "JupyterLab, such as --no-browser", "test": "pytest"}
 """The tasks that pass arguments which they do not know to another program."""
 
 

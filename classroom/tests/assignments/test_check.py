@@ -213,6 +213,10 @@ def test_a_missing_original_is_made_from_its_source(hand_in, tmp_path, monkeypat
         checked(path)
     write_tiny_set(tmp_path / "course" / "notebooks" / "assignments")
     monkeypatch.chdir(tmp_path / "course")
+    with monkeypatch.context() as without_nbgrader:
+        without_nbgrader.setitem(sys.modules, "rbclassroom.assignments.handout", None)
+        with pytest.raises(SystemExit, match="unpack the handout again"):
+            checked(path)
     monkeypatch.setattr(check, "_run", lambda *_: [])
     path = path.rename(tmp_path / "ps0 (1).ipynb")
     checked(path)
