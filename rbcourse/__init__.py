@@ -59,7 +59,6 @@ entry of docs/ledger.md whose content is in neither text.
 """
 
 from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from rbcourse._migration import RENAMED
@@ -230,11 +229,13 @@ else:
 
     def __getattr__(name: str) -> Any:
         """Import a module when it is first used; name the replacement of a name of version 1."""
-        if name in ("draw", "paper", "report") and find_spec("matplotlib") is None:
-            hint = "install rbcourse with the extra draw, see README.md"
-            raise ImportError(f"rbcourse.{name} needs Matplotlib and Pillow; {hint}")
         if name in _MODULES:
-            return import_module(f"rbcourse.{name}")
+            try:
+                return import_module(f"rbcourse.{name}")
+            except ModuleNotFoundError as error:
+                if error.name == "matplotlib":
+                    error.add_note(f"rbcourse.{name} needs the extra draw, see README.md")
+                raise
         if name in RENAMED:
             raise AttributeError(f"rbcourse.{name} is gone in version 2.0; use {RENAMED[name]}")
         raise AttributeError(f"module 'rbcourse' has no attribute {name!r}")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rbclassroom.assignments.student_code import NotYet, call_student
+from rbclassroom.assignments.student_code import EMPTY, NotYet, call_student
 from rbcourse import Array
 
 Function = Callable[..., Any]
@@ -35,7 +35,8 @@ def _error(function: Function, given: tuple[Any, ...], right: Array, measure: Fu
         (result,) = call_student(function, given)
         return f"{np.abs(measure(result) - right).max():.0e}"
     except (NotYet, TypeError, ValueError) as problem:
-        return "not written" if "is written" in str(problem) else "fails"
+        empty = str(problem) == EMPTY or "nothing is written" in str(problem)
+        return "not written" if empty else "fails"
 
 
 def _time(function: Function, given: tuple[Any, ...]) -> str:
