@@ -75,7 +75,9 @@ _AXIS = re.compile(
     r"(^|[\W_])[xyzXYZ]\d*([\W_]|$)|(?<=[a-z])[XYZ](m|cm|mm)?(?![a-z])|^[xyz](pos|loc)|(pos|loc)[xyz]"
 )
 """Names of columns that may hold a position, such as x1, posX, CameraX, or xpos."""
-_PART_OF_TIME = re.compile(r"(.*_)?([munµ]s|[munµ]?secs?|(milli|micro)sec(ond)?s?|mins?|minutes)")
+_PART_OF_TIME = re.compile(
+    r"((.*_)?(time|stamp|timestamp)_)?([munµ]s|[munµ]?secs?|(milli|micro)sec(ond)?s?|mins?|minutes)"
+)
 """Names of columns that hold a part of the time, beside a column of seconds."""
 _KIND = re.compile(
     r"pose|pos|position|trans|translation|location|quat|quaternion|orientation|rot|rotation"

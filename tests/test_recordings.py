@@ -442,9 +442,10 @@ def test_numbers_of_two_bodies_are_not_one_pose(tmp_path, names):
         rb.read_path(tmp_path / "two.csv")
 
 
-def test_an_id_of_each_row_is_no_body(tmp_path):
+@pytest.mark.parametrize("name", ["id", "latency_ms", "exposure_us"])
+def test_a_number_that_counts_or_measures_a_row_is_no_body_and_no_time(tmp_path, name):
     rows = [f"{i},{0.5 * i},1,2,3,0.5,0.5,0.5,0.5" for i in range(4)]
-    (tmp_path / "id.csv").write_text("\n".join(["id,time,x,y,z,qw,qx,qy,qz", *rows, ""]))
+    (tmp_path / "id.csv").write_text("\n".join([f"{name},time,x,y,z,qw,qx,qy,qz", *rows, ""]))
     assert len(rb.read_path(tmp_path / "id.csv")[0]) == 4
 
 
