@@ -13,9 +13,9 @@ from sweeps import made
 
 from rbclassroom.assignments import sandbox
 from rbclassroom.course.lab import configure
+from rbclassroom.lecture.pdf import BROWSERS
 
 HERE = Path(__file__).parent
-CHROMIUM = "chromium", "chromium-browser", "google-chrome", "msedge"
 
 
 def sandbox_for(named):
@@ -29,8 +29,8 @@ def pages_for(named):
     """Make the book and configure JupyterLab; return why pages cannot be tested, or ""."""
     from rbclassroom.live import engine
 
-    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUM)), None)
-    os.environ["CHROMIUM"] = found or (find_program("chromium", *CHROMIUM) if named else "")
+    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
+    os.environ["CHROMIUM"] = found or (find_program(BROWSERS[0], *BROWSERS) if named else "")
     if not os.environ["CHROMIUM"]:
         return "Chromium is not found; install it, or set CHROMIUM to its path"
     try:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from rbcourse.files import replace_file
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
-"""Programs that print a page as PDF."""
+BROWSERS = ["chromium-headless-shell", "chromium", "chromium-browser"]
+BROWSERS += ["google-chrome", "chrome", "msedge"]
+"""Programs that print a page as PDF; the first has no window, and is the fastest."""
 
 
 def print_pdf(address: str, pdf: Path) -> None:
