@@ -55,6 +55,7 @@ TASKS = {  # the environment, commands and purpose of each task; the last comman
     "lint": ("test", ["ruff check", "ruff format --check", "mypy"], "check style and types"),
 }
 PATHS = "check", "collect", "test"  # tasks with paths, relative to the terminal's folder
+OFFLINE = "connection", "name resolution", "getaddrinfo", "timed out"  # words of pip
 
 
 class SetUpError(Exception):
@@ -321,6 +322,12 @@ if __name__ == "__main__":
     try:
         main()
     except (SetUpError, OSError) as error:
+        if isinstance(error, SetUpError) and any(word in str(error) for word in OFFLINE):
+            sys.exit(
+                "\nThe packages could not be downloaded. Connect this computer to the internet (or "
+                "set HTTPS_PROXY if there is a proxy), and run the command again. pip says: %s"
+                % str(error).strip().split("\n")[0][:200]
+            )
         print("\n%s" % error)
         if getattr(error, "errno", None) in (errno.EACCES, errno.EPERM, errno.EROFS):
             print("Copy the course to a folder in which you can write.")

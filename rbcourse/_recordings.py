@@ -171,9 +171,9 @@ def read_recording(
     complete = np.isfinite(table).all(axis=1)
     if "qw" in found:  # many programs write zeros where they have lost the body
         complete &= np.any([found[name] for name in QUATERNION], axis=0)
-    dropped = {"nan": np.flatnonzero(~complete).tolist()}
-    if dropped["nan"] and "nan" not in skip:
-        i = dropped["nan"][0]
+    dropped: list[int] = np.flatnonzero(~complete).tolist()
+    if dropped and "nan" not in skip:
+        i = dropped[0]
         raise ValueError(
             f"{rows.place(i)}: a number is missing or the quaternion is 0 in "
             f"{rows.texts[i][:60]!r}; skip='nan' leaves such rows out"
@@ -189,13 +189,24 @@ def read_recording(
         stamps = _stamps(rows, kept, columns, known or "s")
     if unit != "s" and rate is None:
         _check_unit(rows.place(kept[0]), stamps, known, sure=bool(unit or stated))
-    dropped |= {"repeated": [], "unordered": []}
-    ordered, increasing, last = list[int](), list[Decimal](), Decimal("-inf")
+    ordered, more = _increasing(rows, kept, stamps, skip)
+    for kind, which in {"nan": dropped, **more}.items():
+        if which:
+            some = ", ".join(str(rows.lines[i]) for i in which[:8]) + ", …" * (len(which) > 8)
+            _LOG.warning("%s: left out %s rows (%d), in line %s", file, kind, len(which), some)
+    columns_kept = {name: column[[*ordered]] for name, column in found.items()}
+    return Recording(file, [rows.lines[i] for i in ordered], [*ordered.values()], columns_kept)
+
+
+def _increasing(
+    rows: _Rows, kept: Sequence[int], stamps: Sequence[Decimal], skip: Collection[str]
+) -> tuple[dict[int, Decimal], dict[str, list[int]]]:
+    """Return the increasing times of rows, by row, and the rows that `skip` leaves out."""
+    ordered, last = dict[int, Decimal](), Decimal("-inf")
+    dropped: dict[str, list[int]] = {"repeated": [], "unordered": []}
     for i, stamp in zip(kept, stamps, strict=True):
         if stamp > last:
-            ordered.append(i)
-            increasing.append(stamp)
-            last = stamp
+            ordered[i] = last = stamp
             continue
         kind, why = ("repeated", "equal to") if stamp == last else ("unordered", "earlier than")
         if kind not in skip:
@@ -207,12 +218,7 @@ def read_recording(
                 f"row before; {cure}"
             )
         dropped[kind].append(i)
-    for kind, which in dropped.items():
-        if which:
-            some = ", ".join(str(rows.lines[i]) for i in which[:8]) + ", …" * (len(which) > 8)
-            _LOG.warning("%s: left out %s rows (%d), in line %s", file, kind, len(which), some)
-    columns_kept = {name: column[ordered] for name, column in found.items()}
-    return Recording(file, [rows.lines[i] for i in ordered], increasing, columns_kept)
+    return ordered, dropped
 
 
 def text_lines(file: File) -> list[str]:

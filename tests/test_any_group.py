@@ -145,7 +145,7 @@ def excess(R, n):
 
 
 @pytest.mark.source("beyond BK 10")
-@pytest.mark.parametrize("n", [4, 5])
+@pytest.mark.parametrize("n", [4, pytest.param(5, marks=pytest.mark.slow)])
 def test_the_excess_agrees_with_the_note_in_higher_dimensions(n):
     """Bézier's curve has the excess E; the excess of the corrected curve is of eighth order."""
     d = n * (n - 1) // 2

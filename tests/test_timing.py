@@ -170,7 +170,7 @@ def test_times_with_box_limits_agree_with_toppra():
 
 @pytest.mark.parametrize("name", SETS)
 def test_one_limit_is_reached_at_nearly_all_times(name):
-    for seed in range(3):
+    for seed in range(2):
         timed = rb.fastest(random_chain(100 + seed), **SETS[name])
         t = np.linspace(*timed.domain, 100_001)
         V, A, R = (timed(t, order) for order in (1, 2, 0))
@@ -283,15 +283,13 @@ def test_the_least_time_does_not_depend_on_the_clock(name):
     """Shift and scale the times. A shift loses the digits of the times below its ulp."""
     c, limits = random_chain(8), SETS[name]
     poses, T = c(c.times), rb.fastest(c, **limits).domain[1]
-    for shift, tolerance in ((0, 1e-12), (1e3, 1e-11), (1e6, 1e-9), (1.7e9, 1e-6)):
-        for unit in (1, 1e3):
-            later = spline(unit * c.times + shift, poses)
-            timed = rb.fastest(later, **limits)
-            assert timed.domain[1] == pytest.approx(T, rel=tolerance)
-            there = timed.times[np.searchsorted(timed.s, later.times - later.times[0])]
-            assert np.abs(timed(there) - poses).max() < 1e-12
-    short = spline(1e-3 * c.times, poses)
-    assert rb.fastest(short, **limits).domain[1] == pytest.approx(T, rel=1e-12)
+    clocks = [(1e-3, 0, 1e-12), (1e3, 0, 1e-12), (1, 1e3, 1e-11), (1, 1e6, 1e-9), (1, 1.7e9, 1e-6)]
+    for unit, shift, tolerance in clocks:
+        later = spline(unit * c.times + shift, poses)
+        timed = rb.fastest(later, **limits)
+        assert timed.domain[1] == pytest.approx(T, rel=tolerance)
+        there = timed.times[np.searchsorted(timed.s, later.times - later.times[0])]
+        assert np.abs(timed(there) - poses).max() < 1e-12
 
 
 def test_shares_of_limits_do_not_depend_on_the_clock():
@@ -342,17 +340,17 @@ def test_the_times_of_legs_between_stops_do_not_matter():
 
 
 def test_a_recording_needs_little_memory():
-    t, poses = recording(0, 2000)
+    t, poses = recording(0, 1000)
     path = spline(t, poses)
     tracemalloc.start()
     timed = rb.fastest(path, **NORMS)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 2000 * 20e3
-    assert len(timed.s) < 6 * 2000
+    assert peak < 1000 * 20e3
+    assert len(timed.s) < 6 * 1000
     with mock.patch.object(_cells, "_check_memory", wraps=_cells._check_memory) as checked:
         rb.fastest(path, acceleration=1, angular_acceleration=1)
-    assert checked.call_args.args[0] == pytest.approx(4 * 2000, rel=0.1)
+    assert checked.call_args.args[0] == pytest.approx(4 * 1000, rel=0.1)
     with pytest.raises(MemoryError, match="divide the path"):
         _cells._check_memory(10**13)
 

@@ -29,6 +29,8 @@ from rbcourse.optimum._result import ConvergenceError, OptimalChain, OptimalMoti
 from rbcourse.optimum._spline import Found, Problem, solve_spline
 from rbcourse.projection import nearest
 
+TOO_UNEVEN = "the poses may be too far apart, or the times between them too different"
+
 
 @described_by(spline_velocities)
 def minimum_acceleration_spline(
@@ -207,7 +209,7 @@ def _spline(
         problem = problem._replace(functional=effort)
     found = solve_spline(problem, curve)
     if isinstance(found, Failure):
-        raise ConvergenceError(*found)
+        raise ConvergenceError(*found, TOO_UNEVEN)
     legs = optimum_of(problem.functional, problem.own(found.values), found.legs, T, body)
     return OptimalChain(
         duration=np.array(times[-1] - times[0]),

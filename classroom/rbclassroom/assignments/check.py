@@ -170,12 +170,15 @@ def _error(cell: NotebookNode) -> str:
 
 
 def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool]:
-    """Print a line for each problem; return True or False for each visible test."""
+    """Print the state of each problem; return True or False for each visible test."""
     empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered, source, wrong = [], True, "", list[str]()
+    code = (at for at, c in enumerate(notebook.cells) if c.cell_type == "code" and c.source)
+    ended = next((at for at in code if not notebook.cells[at].execution_count), -1)
     for at, cell in enumerate(notebook.cells):
-        error, where = _error(cell), f"cell {at + 1}"
+        where = f"cell {at + 1}"
+        error = _error(cell) or ("was not run to its end" if at == ended else "")
         found = problems.setdefault(locked_cells.title_of(notebook.cells, at), [])
         if is_answer(cell):
             source = cell.source
@@ -189,20 +192,23 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
         elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
             found.append(("hidden", f"{where} has hidden tests only"))
         elif is_test(cell):
-            error = error or ("" if cell.execution_count else "was not run to its end")
-            passed.append(not error)
+            passed.append(not error and bool(cell.execution_count))
             if error:
                 called = [name for name in wrong if re.search(rf"\b{name}\(", source)]
                 wrong += re.findall(r"^def (\w+)", source, re.MULTILINE)
                 error += "".join(f" (It calls {name}: correct that first.)" for name in called[:1])
-            if answered or not error:
-                found.append(("FAILED", f"{where} {error}") if error else ("passed", ""))
-    order = ("FAILED", "empty", "passed", "words", "hidden")
+            if error and (answered or at == ended):
+                found.append(("FAILED", f"{where} {error}"))
+            elif not error:
+                status = "passed" if cell.execution_count else "not run"
+                found.append((status, f"{where} {status}"))
+    order = ("FAILED", "empty", "not run", "passed", "words", "hidden")
     for title, found in problems.items():
         if found:
-            words = "; ".join(said for _, said in found if said)
             status = min((status for status, _ in found), key=order.index)
-            print(f"{status}  {title}" + f": {words}" * bool(words))
+            print(f"{status:8}{title}")
+            shown = (said for kind, said in found if not kind == status == "passed")
+            print("".join(f"{'':8}{said}\n" for said in shown), end="")
     return passed
 
 

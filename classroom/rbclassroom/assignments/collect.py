@@ -9,8 +9,8 @@ import io
 import json
 import re
 import unicodedata
-from collections import defaultdict
-from collections.abc import Iterable
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +25,8 @@ from rbclassroom.assignments.submissions import count_found, read_notebook
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
 LISTS += ["nothing usable", "not on the roster", "missing"]
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
+Group = tuple[str, str, str]  # a set, a student, and the student's number or folder in the LMS
+Owner = tuple[str, str]  # the number and the name of a student in the LMS
 
 
 class Upload(NamedTuple):
@@ -47,10 +49,40 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     if not folder.is_dir():
         raise ValueError(f"folder: an existing folder is wanted, got {folder}")
     sets, roster = _read_sets(assignments), _read_roster(assignments / "students.csv")
-    submitted, rows = assignments / "submitted", list[Row]()
-    groups = defaultdict[tuple[str, str, str], list[Upload]](list)
+    submitted, owners = assignments / "submitted", read_owners(assignments)
+    ids = {row["id"] for row in roster}
+    groups, rows = _grouped(folder, sets, roster)
+    rows += _namesakes(groups, submitted)
+    for group, uploads in groups.items():
+        name, *_, number = group
+        *others, best = uploads
+        owner = best.about["id"], best.about["name"]
+        who = _folder_of(group, [*groups], owner, owners, ids)
+        rows += _renamed(f"{who}/{name}", owner, owners, submitted)
+        owners[f"{who}/{name}"] = owner
+        rows += [("duplicates", other.file, f"{best.file} is used instead") for other in others]
+        rows.append(_take(best, submitted / who / name))
+        if late := _why_late(best, due):
+            rows.append(("late", f"{who}, {name}", late))
+        if roster and who not in ids:
+            rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
+    rows += _missing({name for name, *_ in groups}, roster, submitted)
+    lines = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
+    write_whole(submitted / "owners.json", json.dumps(owners).encode())
+    write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": ""}])
+    return rows
+
+
+def _grouped(
+    folder: Path, sets: dict[str, list[NotebookNode]], roster: list[dict[str, str]]
+) -> tuple[dict[Group, list[Upload]], list[Row]]:
+    """Return the uploads of each student for each set, the best one last, and further rows.
+
+    The rows are for the other files, and for students without a notebook.
+    """
+    groups = defaultdict[Group, list[Upload]](list)
     unused = defaultdict[str, list[str]](list)  # files of students without a notebook
-    files = list(find_files(folder))
+    files, rows = list(find_files(folder)), list[Row]()
     found = ["" if file.kind else _set_of(file, sets) for file in files]
     for file, name, about in zip(files, found, find_owners(files, found), strict=True):
         why = "neither its name nor a folder names a student"
@@ -67,52 +99,63 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
             unused[_label(about, roster)].append(f"{file.label}: {why}")
     for uploads in groups.values():
         unused.pop(_label(uploads[0].about, roster), None)
+        uploads.sort(key=lambda upload: upload[:4])
     rows += [("nothing usable", who, "; ".join(reasons)) for who, reasons in sorted(unused.items())]
-    numbers = defaultdict[tuple[str, str], list[str]](list)
-    for name, student, number in sorted(groups):
-        numbers[name, student].append(number)
-    stored, before = submitted / "owners.json", read_owners(assignments)
-    for (name, student), several in numbers.items():
-        if len(several) > 1 and (submitted / student / name).exists():
-            why = "students have this name, and now numbered folders; delete this one"
-            rows.append(("duplicates", f"submitted/{student}/{name}", f"{len(several)} {why}"))
-    for (name, student, number), uploads in sorted(groups.items()):
-        *others, best = sorted(uploads, key=lambda upload: upload[:4])
-        same, who = numbers[name, student], student
-        is_known = student in {row["id"] for row in roster}
-        owner = best.about["id"], best.about["name"]
-        another = before.get(f"{student}/{name}", owner)[0] != owner[0]
-        if len(same) > 1 or (another and not is_known):
-            plain = [_plain(each) for each in same]
-            apart = len({*plain}) == len(plain)
-            who = f"{student}_{_plain(number) if apart else same.index(number) + 1}"
-        for key in [key for key, known in before.items() if owner[0] and known == owner]:
-            if key.endswith(f"/{name}") and key != f"{who}/{name}":
-                rows.append(_move(submitted / key, submitted / who / name))
-                del before[key]
-        before[f"{who}/{name}"] = owner
-        rows += [("duplicates", other.file, f"{best.file} is used instead") for other in others]
-        rows.append(_take(best, submitted / who / name))
-        if best.about.get("late"):
-            rows.append(("late", f"{who}, {name}", "Canvas marks it as late"))
-        elif due and not best.about["number"] and best.date > written(due):
-            why = f"perhaps: {best.date} may be the date of the download; look in Moodle"
-            why = f"handed in at {best.date}" if best.about["exact"] else why
-            rows.append(("late", f"{who}, {name}", why))
-        if roster and who not in {row["id"] for row in roster}:
-            rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
-    for name in sorted({name for name, *_ in groups}):
+    return dict(sorted(groups.items())), rows
+
+
+def _namesakes(groups: Iterable[Group], submitted: Path) -> Iterator[Row]:
+    """Yield a row for each folder that was collected before another student had the same name."""
+    for (name, student), count in Counter(group[:2] for group in groups).items():
+        if count > 1 and (submitted / student / name).exists():
+            why = f"{count} students have this name, and now numbered folders; delete this one"
+            yield "duplicates", f"submitted/{student}/{name}", why
+
+
+def _folder_of(
+    group: Group, groups: list[Group], owner: Owner, owners: dict[str, Owner], ids: set[str]
+) -> str:
+    """Return the name of a student's folder; it has a number if others have the same name."""
+    name, student, number = group
+    same = [other[2] for other in groups if other[:2] == group[:2]]
+    is_another = owners.get(f"{student}/{name}", owner)[0] != owner[0]
+    if len(same) == 1 and (student in ids or not is_another):
+        return student
+    plain = [_plain(each) for each in same]
+    are_apart = len({*plain}) == len(plain)
+    return f"{student}_{_plain(number) if are_apart else same.index(number) + 1}"
+
+
+def _renamed(key: str, owner: Owner, owners: dict[str, Owner], submitted: Path) -> Iterator[Row]:
+    """Move a student's files that were collected under another name to ``student/set``."""
+    name = key.rpartition("/")[2]
+    for old in [old for old, known in owners.items() if owner[0] and known == owner]:
+        if old.endswith(f"/{name}") and old != key:
+            yield _move(submitted / old, submitted / key)
+            del owners[old]
+
+
+def _why_late(best: Upload, due: datetime | None) -> str:
+    """Return why an upload is late, or ""."""
+    if best.about.get("late"):
+        return "Canvas marks it as late"
+    if not due or best.about["number"] or best.date <= written(due):
+        return ""
+    if best.about["exact"]:
+        return f"handed in at {best.date}"
+    return f"perhaps: {best.date} may be the date of the download; look in Moodle"
+
+
+def _missing(names: set[str], roster: list[dict[str, str]], submitted: Path) -> Iterator[Row]:
+    """Yield a row for each student on the roster without a file for a collected set."""
+    for name in sorted(names):
         for row in roster:
             if not (submitted / row["id"] / name / f"{name}.ipynb").exists():
                 words = f"{row.get('first_name', '')} {row.get('last_name', '')}".strip()
-                rows.append(("missing", f"{row['id']}, {name}", words))
-    lines = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
-    write_whole(stored, json.dumps(before).encode())
-    write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": ""}])
-    return rows
+                yield "missing", f"{row['id']}, {name}", words
 
 
-def read_owners(assignments: Path) -> dict[str, tuple[str, str]]:
+def read_owners(assignments: Path) -> dict[str, Owner]:
     """Return the number and the name in the LMS of each ``student/set`` that was collected."""
     stored = assignments / "submitted" / "owners.json"
     known = json.loads(stored.read_text("utf-8")) if stored.exists() else {}

@@ -42,6 +42,7 @@ LARGEST = 30_000_000  # bytes of a notebook
 PROGRESS = "grading.json"  # the file with the results of a run that is not complete
 Job = tuple[str, str]  # the name of a set, and the name of a student
 Row = dict[str, Any]
+Points = set[tuple[str, str, float]]  # students, sets, and points
 
 
 def grade(names: Iterable[str], assignments: Path, without_box: bool = False) -> list[Path]:
@@ -205,22 +206,19 @@ def _graded(
                         works[work] = job, pool
                     continue
                 for work in wait(works, return_when=FIRST_COMPLETED).done:
-                    (name, student), pool = works.pop(work)
+                    job, pool = works.pop(work)
                     broken = isinstance(work.exception(), BrokenExecutor)
                     free.append(stack.enter_context(worker()) if broken else pool)
                     with Gradebook(course.db_url) as gradebook:
                         result = _result(work)
                         if isinstance(result, str):
-                            _withdraw(gradebook, assignments, name, student)
-                        row = _row(gradebook, name, student, result)
+                            _withdraw(gradebook, assignments, *job)
+                        row = _row(gradebook, *job, result)
                         known, before = _points(gradebook), known
-                    if others := sorted({other for other, *_ in known ^ before} - at_work):
-                        when = f"during the grading of {' and '.join(sorted(at_work))}"
-                        where = f"The earlier points are in gradebook.before-{name}.db."
-                        raise ValueError(f"The points of {others[0]} changed {when}. {where}")
+                    _check_others(known ^ before, at_work, job[0])
                     if isinstance(result, list):
-                        progress.keep((name, student), result)
-                    yield (name, student), row
+                        progress.keep(job, result)
+                    yield job, row
         except (KeyboardInterrupt, GeneratorExit):
             with _without_ctrl_c():
                 for process in active_children():
@@ -230,6 +228,14 @@ def _graded(
                     for job, _ in works.values():
                         _withdraw(gradebook, assignments, *job)
             raise
+
+
+def _check_others(changed: Points, at_work: set[str], name: str) -> None:
+    """Raise ValueError if points of students changed whose submissions were not at work."""
+    if others := sorted({student for student, *_ in changed} - at_work):
+        when = f"during the grading of {' and '.join(sorted(at_work))}"
+        where = f"The earlier points are in gradebook.before-{name}.db."
+        raise ValueError(f"The points of {others[0]} changed {when}. {where}")
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
@@ -295,7 +301,7 @@ def last_line(done: dict[str, str]) -> str:
     return (refused or others or done["error"].strip().splitlines()[-1:])[0]
 
 
-def _points(gradebook: Any) -> set[tuple[str, str, float]]:
+def _points(gradebook: Any) -> Points:
     submissions = (each for student in gradebook.students for each in student.submissions)
     return {(each.student_id, each.assignment.name, each.score) for each in submissions}
 
