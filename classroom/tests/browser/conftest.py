@@ -18,9 +18,12 @@ QUIET = ["--no-sandbox", "--no-first-run", "--disable-quic", "--disable-sync"]
 QUIET += ["--disable-background-networking", "--disable-component-update"]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def context():
-    """Return the browser context of a worker; all its pages share one cache."""
+    """Return a browser context; all its pages share one cache.
+
+    While Playwright runs, no other test can start an event loop, so each module has its own.
+    """
     expect.set_options(timeout=PATIENCE)
     with sync_playwright() as playwright:
         path = os.environ["CHROMIUM"]
