@@ -1,6 +1,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from quick import quick_for
 
 import rbcourse as rb
 from rbclassroom.atlas import random_problems
@@ -135,7 +136,7 @@ TURNS = {  # in degrees: the saddles and the minima of each functional
 
 
 @pytest.mark.parametrize("minimum", [False, True])
-@pytest.mark.parametrize("what", TURNS)
+@pytest.mark.parametrize("what", quick_for(["torque"], TURNS))
 def test_turns_are_minima_if_no_small_rotations_of_the_nodes_reduce_the_cost(what, minimum):
     for degrees in TURNS[what][minimum]:
         curve = upright(what, np.radians(degrees))

@@ -7,6 +7,7 @@ from unittest import mock
 import numpy as np
 import oracles
 import pytest
+from quick import quick_for
 from scipy.integrate import quad
 
 import rbcourse as rb
@@ -23,6 +24,7 @@ SETS = {
     "body": BODY | {"body": rb.Body(np.diag([0.02, 0.03, 0.04]), 1.5, [0.05, 0, 0.1])},
     "accelerations": {"angular_acceleration": 4, "acceleration": 3},
 }
+sets = pytest.mark.parametrize("name", quick_for(["boxes", "body"], SETS))
 
 
 def random_chain(seed):
@@ -168,7 +170,7 @@ def test_times_with_box_limits_agree_with_toppra():
         assert rb.fastest(leg, **limits).domain[1] == pytest.approx(T, rel=1e-5)
 
 
-@pytest.mark.parametrize("name", SETS)
+@sets
 def test_one_limit_is_reached_at_nearly_all_times(name):
     for seed in range(2):
         timed = rb.fastest(random_chain(100 + seed), **SETS[name])
@@ -211,7 +213,7 @@ def test_shares_of_limits_agree_with_the_torque_and_the_force():
     np.testing.assert_allclose(np.linalg.norm(used["acceleration"][:, 0], axis=1), size, atol=1e-7)
 
 
-@pytest.mark.parametrize("name", SETS)
+@sets
 def test_the_least_time_has_the_symmetries_of_the_problem(name):
     """Move or reverse the path, change its times, or change the unit of length. Finally scale all
     limits so that the motion is k times as fast."""
@@ -278,7 +280,7 @@ def test_the_centre_of_a_given_body_is_limited():
     assert of_origin["speed"][0] != pytest.approx(1, rel=0.1)
 
 
-@pytest.mark.parametrize("name", SETS)
+@sets
 def test_the_least_time_does_not_depend_on_the_clock(name):
     """Shift and scale the times. A shift loses the digits of the times below its ulp."""
     c, limits = random_chain(8), SETS[name]

@@ -2,8 +2,6 @@
 
 import os
 import shutil
-import subprocess
-import sys
 from functools import cache
 from pathlib import Path
 
@@ -26,7 +24,7 @@ def sandbox_for(named):
 
 
 def pages_for(named):
-    """Make the book and configure JupyterLab; return why pages cannot be tested, or ""."""
+    """Find Chromium and fetch Pyodide; return why pages cannot be tested, or ""."""
     from rbclassroom.live import engine
 
     found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -38,10 +36,6 @@ def pages_for(named):
     except OSError as error:
         return str(error)
     configure()
-    print("Making the book ...", flush=True)
-    words = [sys.executable, "-m", "rbclassroom.book.build", "--live"]
-    if subprocess.run(words, cwd=HERE.parents[1], stdout=subprocess.DEVNULL).returncode:
-        raise pytest.UsageError("the book could not be made; the messages are above")
     return ""
 
 

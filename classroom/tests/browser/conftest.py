@@ -4,12 +4,15 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from pages import watched
 from playwright.sync_api import expect, sync_playwright
 from servers import serving
+
+from rbcourse.files import replace_file
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
@@ -32,6 +35,23 @@ def context():
         context.set_default_timeout(PATIENCE)
         yield context
         chromium.close()
+
+
+@pytest.fixture(scope="session")
+def book(tmp_path_factory):
+    """Make the book, once for all workers."""
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", os.getpid())
+    done = tmp_path_factory.getbasetemp().parent / f"book-{run}"
+    try:
+        done.with_suffix(".begun").touch(exist_ok=False)
+    except FileExistsError:
+        while not done.exists():  # another worker makes it
+            time.sleep(0.2)
+    else:
+        words = [sys.executable, "-m", "rbclassroom.book.build", "--live"]
+        code = subprocess.run(words, cwd=ROOT, stdout=subprocess.DEVNULL).returncode
+        replace_file(done, str(code).encode())
+    assert done.read_text() == "0", "the book could not be made"
 
 
 @pytest.fixture(scope="session")

@@ -15,10 +15,13 @@ from pages import shown
 from playwright.sync_api import expect
 from quick import quick_for
 
+pytestmark = pytest.mark.usefixtures("book")
 ROOT = Path(__file__).parents[3]
 BOOK = ROOT / "book"
-PAGES = sorted(path.relative_to(BOOK).as_posix() for path in BOOK.rglob("*.html"))
-LESSONS = sorted((BOOK / "lessons").glob("[0-9]*.html"))
+LESSONS = [
+    BOOK / "lessons" / f"{path.stem}.html"
+    for path in sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
+]
 MEASURE = Path(__file__).with_name("measure.js").read_text("utf-8")
 KINDS = [
     *("index.html", "ledger.html", "figures.html", "install.html", "search.html"),
@@ -53,13 +56,14 @@ class Page:
         self.faults = {fault: found for fault, found in faults.items() if found}
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def parsed():
-    return {name: Page(name) for name in PAGES}
+    pages = sorted(path.relative_to(BOOK).as_posix() for path in BOOK.rglob("*.html"))
+    return {name: Page(name) for name in pages}
 
 
 def test_every_page_is_complete_and_every_link_has_a_target(parsed):
-    assert set(KINDS) <= set(PAGES)
+    assert set(KINDS) <= set(parsed)
     assert {name: page.faults for name, page in parsed.items() if page.faults} == {}
     broken = []
     for name, page in parsed.items():

@@ -31,6 +31,7 @@ from rbclassroom.book.serve import Handler
 from rbclassroom.live import engine
 from rbclassroom.live.pages import LEFT_OUT
 
+pytestmark = pytest.mark.usefixtures("book")
 ROOT = Path(__file__).parents[3]
 BOOK = ROOT / "book"
 LIVE = BOOK / "_static" / "live"
@@ -116,7 +117,8 @@ def test_at_least_250_cells_can_be_run():
     assert sum(len(re.findall(r"\btag_try-", page)) for page in pages) >= 250
 
 
-@pytest.mark.parametrize("name", quick_for(["ps1"], SETS))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SETS)
 def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
     setup = cells(name)["setup"].source, TABLES[name]["helpers"]
     answers = {key: cell.source for key, cell in cells(name).items() if key.endswith("-answer")}

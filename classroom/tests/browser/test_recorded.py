@@ -14,6 +14,7 @@ from rbclassroom import explorers
 from rbclassroom.explorers import recorded
 from rbcourse.draw import animate
 
+pytestmark = pytest.mark.usefixtures("book")  # it records the explorers
 ROWS = "div:has(> input), .rbcourse-choice"
 HOUR = 3_600_000  # ms
 

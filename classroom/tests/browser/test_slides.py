@@ -17,6 +17,7 @@ from rbclassroom.lecture.deck import write
 from rbclassroom.lecture.slides import deck_of
 from rbcourse.draw.save import SHOWN
 
+pytestmark = pytest.mark.usefixtures("book")
 ROOT = Path(__file__).parents[3]
 SLIDES = ROOT / "book" / "slides"
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
