@@ -68,7 +68,7 @@ A group "axis" is a part of the meaning. Between p or q and the axis, EuRoC has 
 """
 _OTHER = re.compile(
     r"(.*_)?(std|stddev|err|error|cov|covariance|var|variance|sigma|vel|velocity|rate|linear|angular"
-    r"|acc|accel|acceleration|twist|gyr|gyro|mag)(_.*)?"
+    r"|acc|accel|acceleration|twist|gyr|gyro|mag)(_.*)?|(alpha|a)[xyz]_body_.*"
 )
 """Names of columns that hold no pose, although they may contain the name of an axis."""
 _AXIS = re.compile(
@@ -85,7 +85,9 @@ _KIND = re.compile(
 )
 """Words in the names of columns that do not name a body or a frame."""
 _ORDER = re.compile(
-    r"\b(q_?[0-3wxyz]|r[wxyz]|w[\s,]*x[\s,]*y[\s,]*z|x[\s,]*y[\s,]*z[\s,]*w)\b", re.I
+    r"(?<![^\W_])(q_?[0-3wxyz]|r[wxyz]|w[\s,]*x[\s,]*y[\s,]*z|x[\s,]*y[\s,]*z[\s,]*w"
+    r"|w[\s-]*(first|last)|scalar[\s-]*(first|last)|real[\s-]*(first|last))(?![^\W_])",
+    re.I,
 )
 """Words in a comment that may tell the order of a quaternion."""
 _BODIES = "child_frame_id", "frame_id", "device_id", "vehiclename", "vehicle", "body", "object"
@@ -354,7 +356,9 @@ def _header(rows: _Rows, heads: Sequence[tuple[int, str, bool]]) -> list[str]:
             continue
         if len(names) != width:
             raise ValueError(f"{place}: {width} names of columns are wanted, got {len(names)}")
-        if not units and all(name.strip("[]()").lower() in {"", *_UNITS} for name in names):
+        if not units and all(
+            name.strip("[]()").lower() in {"", "1", "-", *_UNITS} for name in names
+        ):
             units = [name.strip("[]()") for name in names]  # below the names
             continue
         return (
@@ -607,7 +611,7 @@ def _check_unit(place: str, stamps: Sequence[Decimal], known: str | None, sure: 
         if 0 < step < 1e-6:
             raise ValueError(
                 f"{place}: in {known}, the steps of the times have the median {step:.3g} s; unit= "
-                "gives another unit"
+                "gives another unit, and unit='s' reads them as they are"
             )
         return
     unclear = len(stamps) > 9 and step >= 1 and not 6e8 < first < 4e9

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
-from scipy.interpolate import CubicSpline, make_interp_spline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, make_interp_spline
 
 import rbcourse as rb
 
@@ -348,6 +348,19 @@ def test_a_rotation_and_a_position_are_joined(turn):
         a = path(knots, 2)
         squares = np.sum(a[:-1] ** 2 + a[:-1] * a[1:] + a[1:] ** 2, axis=1) / 3
         assert translation == pytest.approx(squares @ np.diff(knots) / k**3, rel=1e-9)
+
+
+@pytest.mark.parametrize("shift", [0, 1.7e9])
+def test_smooth_positions_that_rest_at_their_knots_are_joined(shift):
+    """After 1970, neighbouring times differ by 2e-7 s, in which the velocity changes."""
+    t = shift + np.array([0, 1, 2.5])
+    turn = rb.projected_spline(t, ROTATIONS[:3], "rest", rest_at=[1])
+    there = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    clamped = CubicSpline(t[[0, 1, 2]], there[[0, 1, 0]], bc_type="clamped")
+    for path in (CubicHermiteSpline(t, there, 0 * there), clamped, CubicSpline(t, there)):
+        assert np.abs(rb.joined(turn, path)(t)[:, :3, 3] - path(t)).max() < 1e-12
+    with pytest.raises(ValueError, match=r"^position: its velocity jumps"):
+        rb.joined(turn, make_interp_spline(t, there, k=1))
 
 
 def corners(share):

@@ -219,6 +219,10 @@ REFUSED = {
         f"# t p(x,y,z) q(w,x,y,z)\n0 {ROWS.replace(',', ' ')}\n",
         "8 columns are not recognised in 'line 1: t p.*format='tum' reads",
     ),
+    **{
+        f"order_{k}.txt": (f"# {words}\n0 {ROWS.replace(',', ' ')}\n", "columns are not recogn")
+        for k, words in enumerate(("t position quaternion_wxyz", "scalar first", "q (w first)"))
+    },
     "nine_columns.txt": (f"# id t x y z qw qx qy\n1 0 {ROW}\n", "9 columns are not recognised in"),
     "only_std.csv": (
         f"t,odom_a,odom_b,odom_c,qw,qx,qy,qz,my_x,my_y\n0,{ROWS},1,2\n",
@@ -482,3 +486,16 @@ def test_columns_that_are_not_read_are_named_if_there_is_no_position(tmp_path, c
         assert rb.read_path(file)[1].shape == (4, 3, 3)
         assert ("not read: north, east, down" in caplog.text) == said
         caplog.clear()
+
+
+@pytest.mark.parametrize("units", ["[s],[mm],[mm],[mm],[1],[1],[1],[1]", "s,mm,mm,mm,-,-,-,-"])
+def test_quaternions_may_have_the_unit_1(units, tmp_path):
+    file = tmp_path / "units.csv"
+    file.write_text(f"time,x,y,z,qw,qx,qy,qz\n{units}\n0.0,1,2,3,.5,.1,.7,.5\n", "utf-8")
+    np.testing.assert_allclose(rb.read_path(file)[1][0, :3, 3], [1e-3, 2e-3, 3e-3])
+
+
+def test_the_columns_of_a_written_curve_are_known(tmp_path, caplog):
+    rb.write_path(tmp_path / "turn.csv", [0, 1], rb.geodesic(np.eye(3), rb.exp_so3([0, 0, 1])))
+    rb.read_path(tmp_path / "turn.csv")
+    assert caplog.text == ""

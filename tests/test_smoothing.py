@@ -180,7 +180,7 @@ def test_the_noise_is_found_and_reduced():
 
 
 def test_a_short_period_interpolates_and_a_long_one_gives_a_steady_turn():
-    c = rb.smoothing_spline(T, NOISY, period=1e-3)
+    c = rb.smoothing_spline(T, NOISY, period=2e-3)
     assert np.abs(c(T) - NOISY).max() < 1e-8
     spline = rb.quaternion_spline(T, NOISY)
     assert np.abs(c(FINE) - spline(FINE)).max() < 1e-3
@@ -394,3 +394,27 @@ def test_an_optimum_that_is_not_found_raises_an_error():
     R = Rotation.random(12, np.random.default_rng(1)).as_matrix()
     with pytest.raises(rb.optimum.ConvergenceError, match="body may turn too far in the time"):
         minimum_acceleration_smoothing(np.arange(12), R, period=100)
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-7, 1e-5, 5e-4])
+def test_poses_at_nearly_equal_times_are_averaged(gap):
+    """The gap is in steps; two sensors on one clock give such times."""
+    t = 0.05 * np.arange(200)
+    R = rb.exp_so3(np.stack([np.sin(t), np.cos(t), 0 * t], axis=1))
+    R = R @ rb.exp_so3(0.01 * np.random.default_rng(0).normal(size=(200, 3)))
+    t[100] = t[99]
+    for again in (t, np.repeat(t[::2], 2)):
+        close = again + 0.05 * gap * (np.append(1, np.diff(again)) == 0)
+        for smooth in (rb.smoothing_spline, rb.optimum.minimum_acceleration_smoothing):
+            wanted, found = smooth(again, R), smooth(close, R)
+            assert found.period == pytest.approx(wanted.period, rel=1e-4)
+            assert found.noise == pytest.approx(wanted.noise, rel=1e-4)
+            assert rb.angle_between(found(again), wanted(again)).max() < 1e-4
+
+
+def test_a_period_in_another_unit_than_the_times_is_refused():
+    t = np.linspace(0, 10e6, 100)  # µs
+    with pytest.raises(
+        ValueError, match=r"^period: a thousandth of the mean step 1.01e\+05 or more"
+    ):
+        rb.smoothing_spline(t, rb.exp_so3(t[:, None] * [0, 0, 1e-7]), period=0.5)

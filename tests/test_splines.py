@@ -388,7 +388,18 @@ def test_very_uneven_times_give_a_minimum_or_an_error():
 def test_a_failure_names_the_times():
     R = rb.sample_rotation(4, rng=1)
     with pytest.raises(rb.optimum.ConvergenceError, match="the times between them too different"):
-        rb.minimum_acceleration_spline([0, 1e-3, 1, 1000], R)
+        rb.minimum_acceleration_spline([0, 1e-3, 1, 90], R)
+
+
+@every_spline
+def test_nearly_equal_times_are_refused(name):
+    t = 0.1 * np.arange(40)
+    t[20] = t[19] + 9e-7
+    R = rb.exp_so3(np.stack([np.sin(t), np.cos(t), t], axis=1))
+    with pytest.raises(ValueError, match=r"^times\[19\] and times\[20\] are 9e-07 apart"):
+        NATURAL[name](t, R)
+    t[20] = t[19] + 1e-3
+    assert np.abs(NATURAL[name](t, R).jumps(2)).max() < 1e-6
 
 
 @pytest.mark.parametrize("size", [0, 1e-13, 1e-9, 1e-7, 1e-5, 1e-3])

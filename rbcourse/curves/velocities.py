@@ -44,6 +44,7 @@ PathEnds: TypeAlias = (
 """The end conditions of a path: a word, or a pair of velocities."""
 
 _SHORTEST, _LONGEST = 1e-100, 1e100  # limits of a duration
+_CLOSE = 1e-5  # of the usual step; closer times are refused [at 1e-6, w' jumps by 1 %]
 _NEAR_HALF_TURN = 1e-6
 _ENDS = "'natural', 'rest', 'periodic' or a pair of velocities"
 
@@ -310,6 +311,12 @@ def _slopes_of_parabolas(h: Array, slopes: Array) -> Array:
     return np.concatenate([slopes[:1] - h[:1] * bend[:1] / 2, slopes + h * bend[1:] / 2])
 
 
+def usual_step(steps: Array) -> float:
+    """Return the upper quartile of the steps above 0, or 0."""
+    steps = np.sort(steps[steps > 0])
+    return float(steps[3 * len(steps) // 4]) if len(steps) else 0.0
+
+
 def checked_path(
     times: ArrayLike, poses: ArrayLike, velocities: ArrayLike | None = None
 ) -> tuple[Array, Array, Array | None]:
@@ -323,6 +330,13 @@ def checked_path(
     if odd.any():
         i = np.argmax(odd)
         raise ValueError(f"times[{i}] and times[{i + 1}] are {h[i]} apart: too close or too far")
+    usual = usual_step(h)
+    if h.min() < _CLOSE * usual:
+        i = np.argmin(h)
+        raise ValueError(
+            f"times[{i}] and times[{i + 1}] are {h[i]:.3g} apart, most others {usual:.3g}: leave "
+            "one of them out, or use smoothing_spline, which averages their poses"
+        )
     R = poses[:, :3, :3]
     far = np.sum(R[:-1] * R[1:], axis=(1, 2)) + 1 < _NEAR_HALF_TURN**2  # 2 + 2 cos(angle)
     if far.any():

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from rbcourse.draw.animate import Animation, Update, frame_picture, render, save_animation
 from rbcourse.draw.display import Player
 from rbcourse.draw.save import Picture, Table, as_png, csv_text, save_figure, write_figure
+from rbcourse.optimum import ConvergenceError
 
 _NEGATIVE = re.compile(r"-[\d.]+(e[+-]?\d+)?", re.I)
 OPTIONS: Mapping[str, tuple[tuple[int, ...], str]] = {
@@ -153,7 +154,7 @@ def run(
                 raise ValueError(f"figure {name} has no option --{min(other)}")
             drawing = draw(**{key: _shaped(key, value) for key, value in values.items()})
             drawing.write(folder)
-        except ValueError as error:
+        except (ValueError, OSError, ConvergenceError) as error:
             parser.error(str(error))
         print(f"{Path(folder, drawing.name)}: png, pdf, csv", flush=True)
 
