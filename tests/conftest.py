@@ -1,3 +1,4 @@
+import matplotlib.pyplot as plt
 import pytest
 
 from rbclassroom.course.ledger import MISPRINTS, WHAT
@@ -10,3 +11,9 @@ def pytest_collection_modifyitems(items):
             for key in mark.args:
                 if key not in WHAT and key not in MISPRINTS:
                     raise pytest.UsageError(f"{item.nodeid}: {key!r} is not a key of a text")
+
+
+@pytest.fixture(autouse=True)
+def figures_are_closed():
+    yield
+    plt.close("all")

@@ -195,23 +195,7 @@ def rotation_of_quaternions(q):
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def _times(q, side):
-    """Return the matrices (4, 4, ...) of p ↦ q p (side 0) or of p ↦ p q (side 1)."""
-    columns = [
-        quaternion_product(*((q, e) if side == 0 else (e, q)))
-        for e in np.eye(4).reshape(4, 4, *(1 for _ in q.shape[1:]))
-    ]
-    return np.stack(np.broadcast_arrays(*columns), axis=1)
-
-
-def _crosses(v):
-    """Return the matrices (3, 3, N) of x ↦ v × x."""
-    x, y, z = v
-    nothing = np.zeros_like(x)
-    return np.array([[nothing, -z, y], [z, nothing, -x], [-y, x, nothing]])
-
-
-def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
+def minimum_acceleration(turn, w0, w1, tol=1e-9):
     """Solve BK (19) from I to exp(turn) by SciPy's `solve_bvp`: 13 equations for q, w, w', w''.
 
     Returns the solution; `sol(t)` has the quaternion in rows 0 – 3, and w in rows 4 – 6.
@@ -225,13 +209,6 @@ def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
         q, w, acceleration, jerk = y[:4], y[4:7], y[7:10], y[10:]
         spin = quaternion_product(q, embedded(w)) / 2
         return np.concatenate([spin, acceleration, jerk, -np.cross(w, jerk, axis=0)])
-
-    def rates_by_y(_, y):
-        J = np.zeros((13, 13, y.shape[1]))
-        J[:4, :4], J[:4, 4:7] = _times(embedded(y[4:7]), 1) / 2, _times(y[:4], 0)[:, 1:] / 2
-        J[4:10, 7:13] = np.eye(6)[..., None]
-        J[10:, 4:7], J[10:, 10:] = _crosses(y[10:]), -_crosses(y[4:7])
-        return J
 
     angle = np.linalg.norm(turn)
     axis = np.asarray(turn) / angle
@@ -248,18 +225,11 @@ def minimum_acceleration(turn, w0, w1, tol=1e-9, jacobians=False):
             [start[:4] - [1, 0, 0, 0], start[4:7] - w0, turned[1:], end[4:7] - w1]
         )
 
-    def misses_by_ends(start, end):
-        by_start, by_end = np.eye(13, 13), np.zeros((13, 13))
-        by_start[7:] = 0
-        by_end[7:10, :4], by_end[10:, 4:7] = _times(goal_back, 0)[1:], np.eye(3)
-        return by_start, by_end
-
     t = np.linspace(0, 1, 11)
     guess = np.zeros((13, 11))
     guess[:4] = quaternion(3 * t**2 - 2 * t**3)
     guess[4:7] = np.outer(w0, 1 - t) + np.outer(w1, t)
-    exact = {"fun_jac": rates_by_y, "bc_jac": misses_by_ends} if jacobians else {}
-    return solve_bvp(rates, misses, t, guess, tol=tol, max_nodes=100_000, **exact)
+    return solve_bvp(rates, misses, t, guess, tol=tol, max_nodes=100_000)
 
 
 def free_body(moments, a, c, t):

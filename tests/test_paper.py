@@ -20,12 +20,6 @@ STORED = {f"paper_fig{name}": draw for name, draw in paper.FIGURES.items()}
 STORED |= {f"report_fig{name}": draw for name, draw in report.FIGURES.items()}
 
 
-@pytest.fixture(autouse=True)
-def figures_are_closed():
-    yield
-    plt.close("all")
-
-
 def axes_of(*kinds):
     fig = Figure()
     return [fig.add_subplot(1, len(kinds), k, projection=kind) for k, kind in enumerate(kinds, 1)]

@@ -33,12 +33,6 @@ PATH, ARM_PATH = RNG.uniform(-3, 3, (12, 3)), RNG.uniform(-3, 3, (12, 2))
 PLAN = [([1, 0.5, -1], 2), ([0, 0, 3], 0.5)]
 
 
-@pytest.fixture(autouse=True)
-def figures_are_closed():
-    yield
-    plt.close("all")
-
-
 def test_names_and_signatures_agree_with_the_report():
     """Parameters that are not in the report are keyword-only and optional."""
     wanted = {name: words.split(", ") for words, names in SIGNATURES.items() for name in names}

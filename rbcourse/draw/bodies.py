@@ -29,12 +29,11 @@ def pose_table(first: Table, poses: Array) -> Table:
     return {**first, **position, **entries}
 
 
-def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Table:
+def motion_table(t: Array, motion: Curve, drawn: Array) -> Table:
     """Return a table of a motion with times, poses, twists and accelerations.
 
     A column marks the times at which the body is drawn. The twists (w, v) and the accelerations
-    (w', a), where a = Rᵀ d'', are in the body frame (BK 6.3). `unit` is the unit of time: "1", or
-    "s" for the curves of `chain` and `Curve.retimed`.
+    (w', a), where a = Rᵀ d'', are in the body frame (BK 6.3).
 
     Examples
     --------
@@ -43,17 +42,11 @@ def motion_table(t: Array, motion: Curve, drawn: Array, unit: str = "1") -> Tabl
     >>> motion_table(t, geodesic(np.eye(4), np.eye(4)), t[::2])["drawn [1]"]
     array([1, 0, 1, 0, 1, 0, 1])
     """
-    first = {f"t [{unit}]": t, "drawn [1]": np.isin(t, drawn).astype(int)}
-    per, per2 = ("", "") if unit == "1" else (f"/{unit}", f"/{unit}²")
+    first = {"t [1]": t, "drawn [1]": np.isin(t, drawn).astype(int)}
     state = motion.state(t)
-    parts = {f"w{{}} [rad{per}]": (state.velocity, 0), f"v{{}} [m{per}]": (state.velocity, 3)}
-    parts |= {f"w{{}}' [rad{per2}]": (state.acceleration, 0)}
-    parts |= {f"a{{}} [m{per2}]": (state.acceleration, 3)}
-    rates = {
-        name.format(i + 1): rate[:, start + i]
-        for name, (rate, start) in parts.items()
-        for i in range(3)
-    }
+    names = [f"{x}{i} [{unit}]" for x, unit in (("w", "rad"), ("v", "m")) for i in (1, 2, 3)]
+    names += [f"{x}{i}{unit}" for x, unit in (("w", "' [rad]"), ("a", " [m]")) for i in (1, 2, 3)]
+    rates = dict(zip(names, np.hstack([state.velocity, state.acceleration]).T, strict=True))
     return {**pose_table(first, state.pose), **rates}
 
 

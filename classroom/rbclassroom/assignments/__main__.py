@@ -40,7 +40,9 @@ def main() -> None:
                 print(make_solutions(known.set, assignments))
             else:
                 print(make_handout(known.set, assignments, Path()))
-                print("This file is for students. To solve the set here, unpack the file into work/.")
+                print(
+                    "This file is for students. To solve the set here, unpack the file into work/."
+                )
     except (OSError, ValueError, CellExecutionError) as error:
         sys.exit(str(error))
     except KeyboardInterrupt:

@@ -37,6 +37,8 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     folder with the files of the set only, but with the student's functions of earlier sets. The
     functions that pass are added to ``my_motion.py``, beside the folder of the set.
     """
+    if path.is_dir() and (path / f"{path.name}.ipynb").is_file():
+        path = path / f"{path.name}.ipynb"
     if not path.is_file():
         raise ValueError(f"{path} is not a file; give the path of your notebook")
     if path.parent.name == HANDED:
@@ -46,10 +48,14 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     original = nbformat.reads(files.pop(name).decode(), as_version=4)
     saved = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     print(f"checking {path.name}, last saved {saved}", flush=True)
-    print("cell numbers count all cells, as JupyterLab does at the bottom of its window")
+    count = len(notebook.cells)
     if path.name != name:
         print(f"the file to hand in gets the name {name}")
     remarks = restore(notebook, original)
+    where = "as JupyterLab does at the bottom of its window"
+    if len(notebook.cells) != count:
+        where = f"in {HANDED}/{name}, where damaged cells are restored"
+    print(f"cell numbers count all cells, {where}")
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
         Path(own, "work").mkdir()
@@ -102,6 +108,9 @@ def _keep(notebook: NotebookNode, name: str, data: bytes, folder: Path) -> None:
     own = [(grade_id(c), c.source) for c in code if is_answer(c) or grade_id(c) in ("", "setup")]
     tests = [grade_id(c) for c in code if is_test(c) and c.execution_count and not _error(c)]
     mine = find(folder, name)
+    if not all(cell.execution_count for cell in code if is_test(cell)):
+        print(f"{FILE} is not changed, because some tests were not run")
+        return
     try:
         text = mine.read_text("utf-8-sig") if mine.is_file() else ""
         passed = [test.removesuffix("-test") for test in tests]
@@ -140,7 +149,8 @@ def _run(notebook: NotebookNode, own: Path, seconds: int) -> list[str]:
     except (DeadKernelError, CellTimeoutError) as error:
         if isinstance(error, DeadKernelError):
             why = "the code called exit, or used up the memory"
-            ends.append(f"the kernel died in cell {client.at + 1}: {why}")
+            cure = "correct this cell, because grading gives no points to a file whose Python ends"
+            ends.append(f"the kernel died in cell {client.at + 1}: {why}; {cure}")
         cells[client.at].execution_count = None
         ends.append(f"the cells after cell {client.at + 1} were not run")
     except (OSError, RuntimeError, KeyError) as error:
@@ -174,6 +184,7 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
     empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered, source, wrong = [], True, "", list[str]()
+    missing = list[str]()  # what the last answer should define, and does not
     code = (at for at, c in enumerate(notebook.cells) if c.cell_type == "code" and c.source)
     ended = next((at for at in code if not notebook.cells[at].execution_count), -1)
     for at, cell in enumerate(notebook.cells):
@@ -183,10 +194,14 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
         if is_answer(cell):
             source = cell.source
             answered = source.strip() not in ("", empty[grade_id(cell)])
+            wanted = re.findall(r"^def (\w+)", empty[grade_id(cell)], re.MULTILINE)
+            missing = [
+                f"{where} must define {x}" for x in wanted if not re.search(rf"\b{x}\b", source)
+            ]
             if not answered:
                 found.append(("empty", f"{where} is not answered yet"))
             elif error:
-                found.append(("FAILED", f"{where} {error}"))
+                found.append(("fault", f"{where} {error}"))
             elif locked_cells.marks_of(cell).get("grade"):
                 found.append(("words", f"{where} is graded by a person"))
         elif is_test(cell) and not re.search(r"^\s*[^#\s]", cell.source, re.MULTILINE):
@@ -197,15 +212,19 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
                 called = [name for name in wrong if re.search(rf"\b{name}\(", source)]
                 wrong += re.findall(r"^def (\w+)", source, re.MULTILINE)
                 error += "".join(f" (It calls {name}: correct that first.)" for name in called[:1])
+                error += "".join(f" ({words}.)" for words in missing[:1])
             if error and (answered or at == ended):
                 found.append(("FAILED", f"{where} {error}"))
             elif not error:
                 status = "passed" if cell.execution_count else "not run"
                 found.append((status, f"{where} {status}"))
-    order = ("FAILED", "empty", "not run", "passed", "words", "hidden")
+    order = ("FAILED", "fault", "empty", "not run", "passed", "words", "hidden")
     for title, found in problems.items():
         if found:
-            status = min((status for status, _ in found), key=order.index)
+            kinds = {kind for kind, _ in found}
+            status = min(kinds, key=order.index)
+            if status == "fault":  # a cell may stop after the function that is tested
+                status = "passed" if "passed" in kinds and "not run" not in kinds else "FAILED"
             print(f"{status:8}{title}")
             shown = (said for kind, said in found if not kind == status == "passed")
             print("".join(f"{'':8}{said}\n" for said in shown), end="")

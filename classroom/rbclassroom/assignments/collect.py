@@ -10,7 +10,7 @@ import json
 import re
 import unicodedata
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -44,14 +44,15 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     """Copy the notebooks in a folder to ``submitted/``, and return a row for each file.
 
     If a student has several files for a set, the newest is used. A file in ``submitted/`` is
-    replaced only by a newer one. ``submitted/report.csv`` stores the rows.
+    replaced only by a newer one. ``submitted/report.csv`` stores the rows, and keeps those of other
+    sets and other students from earlier runs.
     """
     if not folder.is_dir():
         raise ValueError(f"folder: an existing folder is wanted, got {folder}")
     sets, roster = _read_sets(assignments), _read_roster(assignments / "students.csv")
     submitted, owners = assignments / "submitted", read_owners(assignments)
     ids = {row["id"] for row in roster}
-    groups, rows = _grouped(folder, sets, roster)
+    groups, rows, labels = _grouped(folder, sets, roster)
     rows += _namesakes(groups, submitted)
     for group, uploads in groups.items():
         name, *_, number = group
@@ -60,31 +61,57 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         who = _folder_of(group, [*groups], owner, owners, ids)
         rows += _renamed(f"{who}/{name}", owner, owners, submitted)
         owners[f"{who}/{name}"] = owner
+        labels[who] = owner
         rows += [("duplicates", other.file, f"{best.file} is used instead") for other in others]
         rows.append(_take(best, submitted / who / name))
         if late := _why_late(best, due):
             rows.append(("late", f"{who}, {name}", late))
         if roster and who not in ids:
             rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
-    rows += _missing({name for name, *_ in groups}, roster, submitted)
-    lines = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
+    names = sorted({name for name, *_ in groups})
+    rows += _missing(names, roster, submitted)
+    # before there was a roster, the label was made from the name and the number
+    students = {*labels, *(f"{name} {number}".strip() for number, name in labels.values())}
+    before = [row for row in read_report(assignments) if _still_holds(row, names, students)]
+    now = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
+    lines = [*before, *(row | {"sets": " ".join(names)} for row in now)]
+    owners |= {what: labels[what] for kind, what, _ in rows if kind == "nothing usable"}
     write_whole(submitted / "owners.json", json.dumps(owners).encode())
-    write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": ""}])
+    write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": "", "sets": ""}])
     return rows
+
+
+def _still_holds(row: dict[str, str], names: list[str], students: Collection[str]) -> bool:
+    """Tell whether a row of an earlier run is about other sets, or about another student."""
+    if not {*row["sets"].split()} & {*names}:
+        return True
+    student = row["what"].partition(", ")[0]
+    return row["list"] in ("late", "nothing usable") and student not in students
+
+
+def read_report(assignments: Path) -> list[dict[str, str]]:
+    """Return the rows of all runs of `collect`, with the sets that each run collected."""
+    report = assignments / "submitted" / "report.csv"
+    text = report.read_text("utf-8-sig") if report.exists() else ""
+    rows = csv.DictReader(io.StringIO(text, newline=""))
+    return [{**row, "sets": row.get("sets") or ""} for row in rows]
 
 
 def _grouped(
     folder: Path, sets: dict[str, list[NotebookNode]], roster: list[dict[str, str]]
-) -> tuple[dict[Group, list[Upload]], list[Row]]:
+) -> tuple[dict[Group, list[Upload]], list[Row], dict[str, Owner]]:
     """Return the uploads of each student for each set, the best one last, and further rows.
 
-    The rows are for the other files, and for students without a notebook.
+    The rows are for the other files, and for students without a notebook. The last result has the
+    number and the name of all students, by their labels.
     """
     groups = defaultdict[Group, list[Upload]](list)
     unused = defaultdict[str, list[str]](list)  # files of students without a notebook
-    files, rows = list(find_files(folder)), list[Row]()
+    files, rows, labels = list(find_files(folder)), list[Row](), dict[str, Owner]()
     found = ["" if file.kind else _set_of(file, sets) for file in files]
     for file, name, about in zip(files, found, find_owners(files, found), strict=True):
+        if about:
+            labels[_label(about, roster)] = about["id"], about["name"]
         why = "neither its name nor a folder names a student"
         why = file.why or (_mismatch(name, about, sets) if about else why)
         if about and not why:
@@ -101,7 +128,7 @@ def _grouped(
         unused.pop(_label(uploads[0].about, roster), None)
         uploads.sort(key=lambda upload: upload[:4])
     rows += [("nothing usable", who, "; ".join(reasons)) for who, reasons in sorted(unused.items())]
-    return dict(sorted(groups.items())), rows
+    return dict(sorted(groups.items())), rows, labels
 
 
 def _namesakes(groups: Iterable[Group], submitted: Path) -> Iterator[Row]:
@@ -146,9 +173,9 @@ def _why_late(best: Upload, due: datetime | None) -> str:
     return f"perhaps: {best.date} may be the date of the download; look in Moodle"
 
 
-def _missing(names: set[str], roster: list[dict[str, str]], submitted: Path) -> Iterator[Row]:
+def _missing(names: list[str], roster: list[dict[str, str]], submitted: Path) -> Iterator[Row]:
     """Yield a row for each student on the roster without a file for a collected set."""
-    for name in sorted(names):
+    for name in names:
         for row in roster:
             if not (submitted / row["id"] / name / f"{name}.ipynb").exists():
                 words = f"{row.get('first_name', '')} {row.get('last_name', '')}".strip()

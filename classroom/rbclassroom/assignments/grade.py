@@ -1,8 +1,6 @@
 """Grade each submission of a problem set; write the feedback and a table of the points."""
 
-import csv
 import glob
-import io
 import json
 import logging
 import os
@@ -28,7 +26,7 @@ from traitlets.config import Config
 
 from rbclassroom.assignments import locked_cells, sandbox
 from rbclassroom.assignments.autograding import configure
-from rbclassroom.assignments.collect import read_owners
+from rbclassroom.assignments.collect import read_owners, read_report
 from rbclassroom.assignments.handout import find_set, read_config
 from rbclassroom.assignments.locked_cells import grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
@@ -101,7 +99,9 @@ def _write_table(name: str, rows: list[Row], assignments: Path) -> Path:
         number, who = owners.get(f"{row['student']}/{name}", ("", ""))
         rows[at] = {"student": row["student"], "number": number, "name": who} | row
     for what, reason in _not_collected(name, assignments, {row["student"] for row in rows}):
-        rows.append({"student": _tidy(what), "set": name, "remarks": _tidy(reason)})
+        number, who = owners.get(what, ("", ""))
+        row = {"student": _tidy(what), "number": number, "name": who, "set": name}
+        rows.append(row | {"remarks": _tidy(reason)})
         print(f"{name}, {rows[-1]['student']}: {rows[-1]['remarks']}", flush=True)
     table = assignments / f"{name}-grades.csv"
     write_csv(table, rows)
@@ -240,7 +240,7 @@ def _check_others(changed: Points, at_work: set[str], name: str) -> None:
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
     sets = {path.name for kind in ("source", "private") for path in assignments.glob(f"{kind}/*")}
-    report = _report(assignments)
+    report = read_report(assignments)
     useless = [row for row in report if row["list"] == "nothing usable"]
     unusable = "".join(row["why"] for row in useless)
     for row in report:
@@ -250,7 +250,7 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
             if student in {each["what"] for each in useless}:
                 continue  # this student has a row of the other kind
             yield student, "no file was collected"
-        elif named and name not in named:
+        elif name not in (row["sets"].split() or named or {name}) or (named and name not in named):
             continue
         elif row["list"] == "nothing usable":
             yield what, f"nothing usable was handed in: {row['why']}"
@@ -259,14 +259,8 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
 
 
 def _perhaps_late(assignments: Path) -> set[str]:
-    rows = (row for row in _report(assignments) if row["list"] == "late")
+    rows = (row for row in read_report(assignments) if row["list"] == "late")
     return {row["what"] for row in rows if row["why"].startswith("perhaps")}
-
-
-def _report(assignments: Path) -> list[dict[str, str]]:
-    report = assignments / "submitted" / "report.csv"
-    text = report.read_text("utf-8-sig") if report.exists() else ""
-    return list(csv.DictReader(io.StringIO(text, newline="")))
 
 
 def course_config(name: str, assignments: Path) -> Config:

@@ -172,7 +172,7 @@ def _grown(
     old = parts.pop(name, "")
     accepted = old.partition("\n")[0].split(" · ")[-1].split(", ") if old else []
     if lost := [each for each in accepted if each not in wanted.values()]:
-        raise _Unchanged(f"{lost[0]}, of your earlier {name}, fails now")
+        raise _Unchanged(f"{lost[0]} passed in an earlier check of {name}, and fails now")
     kept = _needed(cells, wanted, [each.get("doc") for each in problems.values()])
     _refuse_clashes(kept, [*parts.values(), own])
     code = "\n\n".join(each.code for each in kept if not each.is_import)

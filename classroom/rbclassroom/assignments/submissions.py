@@ -34,7 +34,7 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
     unknown fields are left out. A half of a surrogate pair becomes "?".
     """
     if not content.strip():
-        raise Refused(f"{name} is empty; open it in JupyterLab and save it, or start again")
+        raise Refused(f"{name} is empty; take an earlier copy, or start again")
     if content.startswith((b"%PDF", b"PK")):
         raise Refused(f"{name} is a PDF or an archive, not a notebook; hand in the notebook")
     try:
@@ -56,7 +56,7 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
 
 
 def _damaged(name: str, why: str) -> Refused:
-    cure = "take an earlier copy, or open it in JupyterLab and save it again"
+    cure = "take an earlier copy, or start again from the handout"
     return Refused(f"{name} is damaged or not a notebook ({why[:80]}); {cure}")
 
 

@@ -77,5 +77,6 @@ def parse(
     made = parser(task, purpose)
     known, further = made.parse_known_args(words)
     if further and task not in FURTHER:
-        made.error(f"unrecognized arguments: {' '.join(further)}")
+        spaces = "; a path with spaces needs quotation marks" * (task in ("check", "collect"))
+        made.error(f"unrecognized arguments: {' '.join(further)}{spaces}")
     return known, further

@@ -230,6 +230,21 @@ def test_a_missing_original_is_made_from_its_source(hand_in, tmp_path, monkeypat
         checked(path.parent / "to_submit" / "ps0.ipynb")
 
 
+def test_a_cell_that_stops_after_its_function_passes_as_in_grading(hand_in, capsys):
+    right = "def square(x):\n    return x * x\n"
+    check.check(hand_in(square=f"{right}1 / 0"))
+    said = capsys.readouterr().out
+    assert "passed  A tiny set\n        cell 3 ZeroDivisionError: division by zero\n" in said
+    assert "2 of 2 visible tests passed" in said
+    check.check(hand_in(square=right.replace("square", "squared")))
+    assert "name 'square' is not defined (cell 3 must define square.)" in capsys.readouterr().out
+
+
+def test_a_folder_stands_for_its_notebook(hand_in, capsys):
+    check.check(hand_in().parent)
+    assert "2 of 2 visible tests passed" in capsys.readouterr().out
+
+
 def test_a_syntax_error_is_reported_without_a_number_as_its_file(hand_in, capsys):
     check.check(hand_in(square="def square(x)\n    return x"))
     assert "SyntaxError: expected ':' (line 1)" in capsys.readouterr().out

@@ -89,7 +89,9 @@ def test_only_accepted_functions_are_kept_and_none_is_lost():
     assert "def projected_line" not in text
     unchanged, said = keep(text, "ps4", data_of("ps4"), answers("ps4"), ["screw"])
     assert unchanged == text
-    assert said == f"{FILE} is not changed: geodesic, of your earlier ps4, fails now"
+    assert (
+        said == f"{FILE} is not changed: geodesic passed in an earlier check of ps4, and fails now"
+    )
     assert keep("", "ps4", data_of("ps4"), answers("ps4"), ["theta"]) == ("", "")
 
 
