@@ -413,6 +413,19 @@ def test_a_folder_that_cannot_be_written_is_reported(started, monkeypatch, capsy
     )
 
 
+@posix
+def test_a_computer_without_a_network_gets_one_sentence(started):
+    said = "WARNING: Failed to establish a new connection: [Errno -3]\\nERROR: nothing found"
+    file = started.folder / "course.py"
+    text = file.read_text("utf-8")
+    file.write_text(
+        text.replace("    set_up(environment)", f'    raise SetUpError("{said}")'), "utf-8"
+    )
+    told = started().communicate()[0].strip()
+    assert told.startswith("The packages could not be downloaded. Connect this computer")
+    assert told.endswith("pip says: WARNING: Failed to establish a new connection: [Errno -3]")
+
+
 def test_a_course_that_cannot_be_written_is_reported_by_lab(monkeypatch):
     def refuse(*_):
         raise PermissionError(errno.EACCES, "Permission denied", "work")
