@@ -162,7 +162,7 @@ class Curve:
 
     @described_by(__call__, returns="State")
     def state(self, t: ArrayLike) -> State:
-        """Return the pose (or rotation), the velocity and the acceleration, in one pass.
+        """Return the pose (or rotation), the velocity and the acceleration.
 
         The fields ``pose``, ``velocity``, ``acceleration`` are ``c(t)``, ``c(t, 1)``, ``c(t, 2)``.
         A controller whose last time is after the end of the curve uses ``min(t, c.domain[1])``.
