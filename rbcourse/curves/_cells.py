@@ -49,7 +49,6 @@ LEAST_AT_STOP = 50  # with 25, a chain of 100 geodesics at a low speed was up to
 DENSE = 0.2  # a leg has fewer cells if its velocity changes by less than this share
 REFINEMENTS = 3  # how often the cells of a leg are halved if it exceeds a limit
 TOLERANCE = 1e-4  # the share by which a limit may be exceeded
-NEAR_REST = 0.04  # the share of a leg, next to a rest, in which limits on speeds are stricter
 
 # Rounding. A leg of duration 1 stands still below STILL. Next to larger values, an end rests below
 # REST of the largest speed, and is slow if its acceleration is below LEVEL of the largest.
@@ -327,9 +326,6 @@ class Cells:
         number = np.arange(total) - first[leg]
         even: Array = np.stack([number, number + 1]) / counts[leg]
         rests: Flags = path.rests[:, leg]
-        start, end = np.any(rests, axis=-1)
-        self.near_rest = start & (even[1] <= NEAR_REST)
-        self.near_rest |= end & (even[0] >= 1 - NEAR_REST)
         self.rests = rests & (even == [[0], [1]])[..., None]  # at the ends of cells
         self.share = _graded(even, path.fine[:, leg])
         h = path.legs.duration[leg]
@@ -359,7 +355,6 @@ class Cells:
         Their shape is (6, cells, ellipses). The vector a u + b x + k is replaced by the quadratic
         polynomial with the same values at the places. It lies in the convex hull of its Bernstein
         coefficients p x + q y + k, so that the limit holds in the whole cell if it holds for them.
-        In cells near rest, where b changes much, limits on speeds use its largest value.
         """
         part = slice(start, stop)
         V, A, R = self._sampled(part, PLACES)
@@ -376,9 +371,6 @@ class Cells:
             needed = f"{held.max():.6g} times the limit is needed to hold the body"
             where = self.near(part.start + np.argmax(held >= 1))
             raise ValueError(f"{limit.name}: {needed} {where}")
-        if limit.of_speed:
-            strict = self.near_rest[part, None, None]
-            b = np.where(strict, b.max(axis=0), b)
         u = a / (2 * self.h[part, None, None])
         place = PLACES[:, None, None, None]
         p = np.tensordot(CONTROL, (1 - place) * b - u, 1)
