@@ -381,7 +381,10 @@ def corners(share):
             np.sin,
             "rotation: it is a Timed; join its path and the position, then call fastest",
         ),
-        (UNEVEN[0], POSES[:2, :3, 3], "position: a callable position(t, order) is wanted, such as"),
+        *(
+            (UNEVEN[0], other, "position: a callable position(t, order) is wanted, such as")
+            for other in (POSES[:2, :3, 3], UNEVEN[0])
+        ),
         (
             UNEVEN[0],
             lambda t: np.zeros(3),

@@ -9,10 +9,8 @@ import csv
 import sys
 import warnings
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import product
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -243,6 +241,9 @@ def table(seeds: int) -> dict[str, list[Any]]:
     """Return for each step, noise and method the geometric mean of the three medians."""
     columns: dict[str, list[Any]] = {"step [rad]": [], "noise [rad]": [], "method": []}
     columns |= {name: [] for name in ERRORS}
+    from concurrent.futures import ProcessPoolExecutor  # not available in web browsers
+    from multiprocessing import get_context
+
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         for step, noise in product(STEPS, NOISES):
             medians = []

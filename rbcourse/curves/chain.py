@@ -251,7 +251,7 @@ def joined(rotation: Curve, position: Position) -> Curve:
 def _check_position(position: Position, domain: tuple[float, float]) -> None:
     """Refuse an object without the call position(t, order), and a spline with corners."""
     wanted = "position: a callable position(t, order) is wanted, such as a CubicSpline"
-    if not callable(position):
+    if not callable(position) or isinstance(position, Curve):
         raise ValueError(f"{wanted}, got {type(position).__name__}")
     try:
         signature(position).bind(np.array(domain), 1)
