@@ -227,7 +227,7 @@ def test_the_book_is_published_only_if_all_tests_pass():
     assert {"run": "python course.py test"} in jobs["test"]["steps"]
     assert jobs["publish"]["needs"] == "test"
     assert "PUBLISH_BOOK" in jobs["publish"]["if"]
-    assert set(re.findall(r"course\.py (\w+)", text)) == {"test", "book"}
+    assert set(re.findall(r"course\.py (\w+)", text)) == {"lint", "test", "book"}
 
 
 @pytest.fixture(scope="module")

@@ -184,7 +184,7 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
     empty = {grade_id(c): c.source.strip() for c in original.cells if is_answer(c)}
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered, source, wrong = [], True, "", list[str]()
-    missing = list[str]()  # what the last answer should define, and does not
+    missing = list[str]()  # names that the last answer should define
     code = (at for at, c in enumerate(notebook.cells) if c.cell_type == "code" and c.source)
     ended = next((at for at in code if not notebook.cells[at].execution_count), -1)
     for at, cell in enumerate(notebook.cells):
