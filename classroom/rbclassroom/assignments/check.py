@@ -108,7 +108,7 @@ def _keep(notebook: NotebookNode, name: str, data: bytes, folder: Path) -> None:
     own = [(grade_id(c), c.source) for c in code if is_answer(c) or grade_id(c) in ("", "setup")]
     tests = [grade_id(c) for c in code if is_test(c) and c.execution_count and not _error(c)]
     mine = find(folder, name)
-    if not all(cell.execution_count for cell in code if is_test(cell)):
+    if not all(cell.execution_count for cell in code if is_test(cell) and cell.source.strip()):
         print(f"{FILE} is not changed, because some tests were not run")
         return
     try:
@@ -185,7 +185,7 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
     problems: dict[str, list[tuple[str, str]]] = {}
     passed, answered, source, wrong = [], True, "", list[str]()
     missing = list[str]()  # names that the last answer should define
-    code = (at for at, c in enumerate(notebook.cells) if c.cell_type == "code" and c.source)
+    code = (at for at, c in enumerate(notebook.cells) if c.cell_type == "code" and c.source.strip())
     ended = next((at for at in code if not notebook.cells[at].execution_count), -1)
     for at, cell in enumerate(notebook.cells):
         where = f"cell {at + 1}"
