@@ -135,7 +135,7 @@ def test_the_cost_of_sharp_turns_is_accurate(margin):
         rb.chain([2, 5], [I3, turn], leg=rb.projected_line),
     ):
         assert rb.acceleration_cost(line) == pytest.approx(4 * np.pi * k**3 / 27, rel=1e-9)
-        least = np.abs(np.setdiff1d(line.breakpoints, 0.5) - 0.5).min()
+        least = np.abs(np.setdiff1d(line.breakpoints[0], 0.5) - 0.5).min()
         assert margin / 20 < least < margin / 4
     # at half time, the cubic turns 3/2 times as fast
     cubic = rb.projected_cubic(I3, turn, REST, REST)
@@ -213,10 +213,21 @@ def test_the_cost_of_a_very_fast_start_is_accurate(speed):
 
 def test_panels_are_equally_fine_for_motions_about_each_axis():
     one, *others = (
-        rb.closed_forms.exponential_cubic(I3, I3, 1e3 * x, 1e3 * x).breakpoints for x in I3
+        rb.closed_forms.exponential_cubic(I3, I3, 1e3 * x, 1e3 * x).breakpoints[0] for x in I3
     )
     assert len(one) > 17
     assert all(other == pytest.approx(one, rel=1e-9) for other in others)
+
+
+@pytest.mark.parametrize("make", [*rb.closed_forms.FORMS.values(), rb.minimum_acceleration])
+def test_the_panels_of_a_curve_do_not_depend_on_the_other_curves_of_its_stack(make):
+    """Only panels of curves that turn fast somewhere are divided further."""
+    goals = rb.exp_so3(np.array([[0, 0, 0.1], [0, 2, 2.0], [0, 0, 3.1]]))
+    w0 = np.random.default_rng(0).normal(size=(3, 3))
+    stack = make(I3, goals, w0, [[0, 0, 0], [0, 3, 8], [0, 0, 0]])
+    for one, points in zip(stack, stack.breakpoints, strict=True):
+        assert np.array_equal(points, one.breakpoints[0])
+    assert len({len(points) for points in stack.breakpoints}) > 1
 
 
 def test_the_cost_of_a_jump_raises_an_error():

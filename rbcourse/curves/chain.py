@@ -308,11 +308,12 @@ class Chain(Curve):
         return float(self.times[0]), float(self.times[-1])
 
     @property
-    def breakpoints(self) -> Array:
+    def breakpoints(self) -> list[Array]:
         """The ends of panels for a quadrature, and the joints, as fractions of the duration."""
         T = self.legs.duration
-        inside = self.legs.breakpoints * T[:, None]
-        return np.unique((np.append(0.0, np.cumsum(T[:-1]))[:, None] + inside) / np.sum(T))
+        starts = np.append(0.0, np.cumsum(T[:-1]))
+        legs = zip(starts, T, self.legs.breakpoints, strict=True)
+        return [np.unique(np.concatenate([a + h * inside for a, h, inside in legs]) / np.sum(T))]
 
     @property
     def margin(self) -> Array:

@@ -364,7 +364,7 @@ class QuaternionCubic(NormalizedCubic):
         return least_over_time(norm, self.batch_shape)
 
     @property
-    def breakpoints(self) -> Array:
+    def breakpoints(self) -> list[Array]:
         """The `Curve.breakpoints`, refined near small margins."""
         return near_margins(super().breakpoints, *self._least)
 
@@ -373,7 +373,7 @@ class CayleyCubic(NormalizedCubic):
     """The `Curve` of a cubic in Cayley parameters."""
 
     @property
-    def breakpoints(self) -> Array:
+    def breakpoints(self) -> list[Array]:
         """The `Curve.breakpoints`, refined near the time when the curve turns fastest."""
 
         def time_for_a_radian(t: Array) -> Array:
@@ -381,7 +381,8 @@ class CayleyCubic(NormalizedCubic):
             Q, rate = (np.linalg.norm(x, axis=0) for x in jet)
             return Q / (1 + rate)
 
-        return graded(super().breakpoints, *least_over_time(time_for_a_radian, self.batch_shape))
+        times, widths = least_over_time(time_for_a_radian, self.batch_shape)
+        return graded(super().breakpoints, times.ravel(), widths.ravel())
 
 
 def _rate(q: Array, w: Array) -> Array:

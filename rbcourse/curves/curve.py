@@ -21,6 +21,7 @@ from rbcourse._valid import as_rotations_or_poses
 from rbcourse.body import Body, of_point
 
 _GROUPS = {3: "SO(3)", 4: "SE(3)"}
+HALVES, SIXTEENTHS = np.arange(3) / 2, np.arange(17) / 16
 _WIDTH, _HEIGHT = 240, 60  # of pictures
 BALL = Body.ball()
 Order: TypeAlias = Literal[0, 1, 2, 3]
@@ -124,8 +125,8 @@ class Curve:
         return np.full(self.batch_shape, np.inf)
 
     @property
-    def breakpoints(self) -> Array:
-        """The ends of panels for a quadrature, as fractions of the duration, shape (n,).
+    def breakpoints(self) -> list[Array]:
+        """The ends of panels for a quadrature of each curve, as fractions of its duration.
 
         The panels are sixteenths of the duration, divided further where a curve may turn fast: near
         an end with a large velocity or acceleration, and near times of small margin. A margin below
@@ -133,8 +134,7 @@ class Curve:
         """
         ends = np.array([[0.0], [1.0]])
         w, a = (np.linalg.norm(self.flat.values(ends, k)[..., :3], axis=-1) for k in (1, 2))
-        fastest = (w + np.sqrt(a)).max(axis=1, initial=0)
-        return graded(np.arange(17) / 16, [0.0, 1.0], 1 / (1 + fastest))
+        return graded([SIXTEENTHS] * self.count, ends, 1 / (1 + w + np.sqrt(a)))
 
     def __call__(self, t: ArrayLike, order: Order = 0) -> Array:
         """Return the curve, or a derivative, at times of any shape in the domain.
@@ -512,7 +512,7 @@ class Moved(Curve):
         return self.curve.margin
 
     @property
-    def breakpoints(self) -> Array:
+    def breakpoints(self) -> list[Array]:
         """The `Curve.breakpoints` of the curve that is moved."""
         return self.curve.breakpoints
 
@@ -591,23 +591,27 @@ def check_defined(t: Array, lost: NDArray[np.bool_], reason: str) -> None:
         raise SingularTime(float(np.broadcast_to(t, lost.shape)[time, curve]), int(curve), reason)
 
 
-def near_margins(points: Array, times: ArrayLike, margins: ArrayLike) -> Array:
-    """Refine `points` near small margins; raise RuntimeError for a margin below 1e-6."""
+def near_margins(points: list[Array], times: ArrayLike, margins: ArrayLike) -> list[Array]:
+    """Refine the points of each curve near a small margin; a margin below 1e-6 is an error."""
     gaps = np.ravel(margins)
     if gaps.min(initial=np.inf) < 1e-6:
         raise RuntimeError(f"cost: the curve almost jumps (margin {gaps.min():.1e})")
-    when, small = np.broadcast_to(np.ravel(times), gaps.shape), gaps < 0.25
-    return graded(points, when[small], gaps[small] / 4)
+    return graded(points, np.ravel(times), np.where(gaps < 0.25, gaps / 4, 1))
 
 
-def graded(points: Array, times: ArrayLike, widths: ArrayLike) -> Array:
-    """Add to `points` those in [0, 1] whose distances from `times` are 1/32, 1/64, …, `widths`."""
-    cuts = [points]
-    for when, width in zip(np.ravel(times), np.ravel(widths), strict=True):
-        apart = 2.0 ** -np.arange(5, max(5, 2 - np.floor(np.log2(width))))
-        cuts += [np.append(when - apart, when), when + apart]
-    points = np.unique(np.concatenate(cuts))
-    return points[(points >= 0) & (points <= 1)]
+def graded(points: list[Array], times: ArrayLike, widths: ArrayLike) -> list[Array]:
+    """Refine the points of each curve near its times, shape (count,) or (n, count).
+
+    The new points are in [0, 1], at the distances 1/32, 1/64, …, `widths` from the times.
+    """
+    points = list(points)
+    times, widths = np.broadcast_arrays(times, np.atleast_2d(widths))
+    finest = 2 - np.floor(np.log2(widths))
+    for k, i in np.argwhere(finest > 5):
+        apart = 2.0 ** -np.arange(5, finest[k, i])
+        near = times[k, i] + np.concatenate([-apart, [0], apart])
+        points[i] = np.union1d(points[i], near[(near >= 0) & (near <= 1)])
+    return points
 
 
 def least_over_time(

@@ -233,7 +233,7 @@ class ProjectedLine(AlongGeodesic):
         return np.broadcast_to(value, shape).reshape(len(t), -1)
 
     @property
-    def breakpoints(self) -> Array:
+    def breakpoints(self) -> list[Array]:
         """The `Curve.breakpoints`, refined near t = 1/2 if the margin is small."""
         return near_margins(super().breakpoints, 0.5, self.margin)
 

@@ -13,7 +13,14 @@ from rbcourse._foam import GAP_ERROR, gaps
 from rbcourse._numerics import BLOCK, Array, blocks, cross
 from rbcourse._polynomials import hermite, hermite_stack, stack_terms
 from rbcourse.body import Body, weight_of
-from rbcourse.curves.curve import Curve, SingularTime, check_defined, least_over_time, near_margins
+from rbcourse.curves.curve import (
+    HALVES,
+    Curve,
+    SingularTime,
+    check_defined,
+    least_over_time,
+    near_margins,
+)
 from rbcourse.curves.ends import Ends, Rate, between
 from rbcourse.curves.rigid import moving
 from rbcourse.projection import NOT_UNIQUE, gap, nearest, warn_if_nearly_singular
@@ -106,13 +113,15 @@ class ProjectedPolynomial(Curve):
         return least
 
     @property
-    def breakpoints(self) -> Array:
-        """The `Curve.breakpoints`, refined near small margins; two panels if turns are small."""
+    def breakpoints(self) -> list[Array]:
+        """The `Curve.breakpoints`, refined near a small margin; two panels if the turn is small."""
         least = self.least_margins(9)
-        if (least > 1).all():  # the margin of a curve that stands still is 2
-            return np.array([0.0, 0.5, 1.0])
-        doubtful = self.flat.take(np.flatnonzero(~(least >= 0.25)))
-        return near_margins(super().breakpoints, *doubtful._least_gap)
+        times, margins = np.full((2, self.count), np.inf)
+        doubtful = np.flatnonzero(~(least >= 0.25))
+        times[doubtful], margins[doubtful] = self.flat.take(doubtful)._least_gap
+        points = near_margins(super().breakpoints, times, margins)
+        small = least > 1  # the margin of a curve that stands still is 2
+        return [HALVES if here else there for here, there in zip(small, points, strict=True)]
 
 
 @described_by(returns="Curve")

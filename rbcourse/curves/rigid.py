@@ -34,7 +34,7 @@ class _WithRotation(Curve):
         return self.rotation.margin
 
     @property
-    def breakpoints(self) -> Array:
+    def breakpoints(self) -> list[Array]:
         """The `Curve.breakpoints` of the rotation."""
         return self.rotation.breakpoints
 
