@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from rbcourse.draw.pictures import data_url
-from rbcourse.draw.scene import Piece, normal_of
+from rbcourse.draw.scene import Piece, normals_of
 from rbcourse.draw.space import not_in_space, scenes
 
 _SCENE, _DISPLAY = (
@@ -98,7 +98,7 @@ class Display(RendererBase):
         return np.concatenate(self._drawn)
 
     def _keep_piece(self, room: int, piece: Piece) -> None:
-        if piece.kind == "face" and not normal_of(np.round(PARTS * piece.places)).any():
+        if piece.kind == "face" and not normals_of(np.round(PARTS * piece.places)).any():
             piece = piece.edge  # the face has no area after rounding
         polygons = (path.to_polygons(closed_only=False) for path in piece.marker)
         marker = _marker(outline for outlines in polygons for outline in outlines)

@@ -172,12 +172,13 @@ def whole_pixels(depth: Any) -> Any:
     return np.floor(depth + 0.3)
 
 
-def normal_of(corners: Array) -> Array:
-    """Return the unit normal of a polygon, shape (n, 3); it is zero if the area is zero."""
-    spokes = corners[1:] - corners[0]
-    normal: Array = np.cross(spokes[:-1], spokes[1:]).sum(axis=0)
-    size = np.linalg.norm(normal)
-    return normal / size if size > 1e-9 * (spokes**2).sum() else np.zeros(3)
+def normals_of(corners: Array) -> Array:
+    """Return the unit normals of polygons, shape (..., n, 3); 0 for those without an area."""
+    spokes = corners[..., 1:, :] - corners[..., :1, :]
+    normal = np.cross(spokes[..., :-1, :], spokes[..., 1:, :]).sum(axis=-2)
+    size = np.linalg.norm(normal, axis=-1, keepdims=True)
+    flat = size <= 1e-9 * np.sum(spokes**2, axis=(-2, -1))[..., None]
+    return np.where(flat, 0.0, normal / np.where(flat, 1.0, size))
 
 
 def context(colour: Any, width: float) -> GraphicsContextBase:
@@ -189,11 +190,22 @@ def context(colour: Any, width: float) -> GraphicsContextBase:
     return gc
 
 
-def crossings(one: Piece, other: Piece) -> list[Piece]:
-    """Return the line in which two faces intersect, with the look of an edge.
+def crossings(one: list[Piece], other: list[Piece]) -> list[Piece]:
+    """Return the lines in which faces of two bodies intersect, with the look of edges."""
+    if not one or not other:
+        return []
+    starts = np.cumsum([0, *(len(face.places) for face in one[:-1])])
+    normals = np.array([wall.normal for wall in other])
+    levels = np.array([wall.places[0] for wall in other]) * normals
+    height = np.concatenate([face.places for face in one]) @ normals.T - levels.sum(axis=1)
+    above = np.maximum.reduceat(height, starts) > -NEAR
+    below = np.minimum.reduceat(height, starts) < NEAR
+    pairs = np.argwhere(above & below)
+    return [line for i, j in pairs for line in _crossing(one[i], other[j])]
 
-    Coplanar faces have no such line.
-    """
+
+def _crossing(one: Piece, other: Piece) -> list[Piece]:
+    """Return the line in which two faces intersect; coplanar faces have no such line."""
     normal: Any = other.normal
     height = (one.places - other.places[0]) @ normal
     i = np.flatnonzero(height * np.roll(height, -1) < 0)
@@ -203,8 +215,9 @@ def crossings(one: Piece, other: Piece) -> list[Piece]:
     share = (height[i] / (height[i] - height[j]))[:, None]
     ends = np.column_stack([(1 - share) * one.places[i] + share * one.places[j], np.zeros(2)])
     parts = [replace(one.edge, places=ends)]
-    for corner, edge in zip(other.places, np.roll(other.places, -1, 0) - other.places, strict=True):
-        inward = np.cross(normal, edge / np.linalg.norm(edge))
-        cut = (part.cut((part.places[:, :3] - corner) @ inward) for part in parts)
+    edges = np.roll(other.places, -1, 0) - other.places
+    inward = np.cross(normal, edges / np.linalg.norm(edges, axis=1, keepdims=True))
+    for corner, across in zip(other.places, inward, strict=True):
+        cut = (part.cut((part.places[:, :3] - corner) @ across) for part in parts)
         parts = [part for some in cut for side, part in some if side > 0]
     return parts

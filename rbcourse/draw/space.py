@@ -7,7 +7,7 @@ through faces.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 from numbers import Integral
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -34,7 +34,7 @@ from rbcourse.draw.scene import (
     context,
     crossings,
     in_sight,
-    normal_of,
+    normals_of,
     whole_pixels,
 )
 
@@ -75,8 +75,8 @@ class Faces(Artist):
         centre = self.corners.mean(axis=(0, 1))
         edge = context(to_rgba(self._edgecolor, self.get_alpha()), self._linewidth)
         opacity = 1.0 if self.get_alpha() is None else self.get_alpha()
-        for corners, colour in zip(self.corners, self._colours, strict=True):
-            normal = normal_of(corners)
+        normals = normals_of(self.corners)
+        for corners, normal, colour in zip(self.corners, normals, self._colours, strict=True):
             if not np.isfinite(corners).all() or not normal.any():
                 continue
             outward = np.sign(normal @ (corners.mean(axis=0) - centre)) * normal
@@ -142,7 +142,7 @@ class Scene(Artist):
                 self._known[artist] = sight.key, made
             found += made
         for one, other in combinations(bodies, 2):
-            found += [line for faces in product(one, other) for line in crossings(*faces)]
+            found += crossings(one, other)
         return found
 
     def draw(self, renderer: Any) -> None:

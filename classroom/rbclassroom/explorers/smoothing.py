@@ -20,6 +20,7 @@ _FASTEST, _LEAST, _MOST = 6.0, 0.05, 50.0
 _BETWEEN = np.linspace(0, 4, 401)
 
 
+@lru_cache(maxsize=64)
 def recorded(noise: float) -> rb.Array:
     """Return rotations that were measured at the `TIMES`; the noise is an RMS in degrees."""
     sigma = np.radians(noise) / 3**0.5
