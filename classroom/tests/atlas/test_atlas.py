@@ -147,3 +147,55 @@ def test_the_maps_use_only_the_first_seed_and_intervals_are_binomial(tmp_path, m
         assert part == pytest.approx(few / len(x), rel=5e-4)
         assert binom.cdf(few, len(x), high) == pytest.approx(0.025, rel=0.05)
         assert binom.sf(few - 1, len(x), low) == pytest.approx(0.025, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_the_conclusions_of_lesson_12_hold_for_other_samples(seed):
+    problems = atlas.atlas_problems(5, rng=seed)
+    found = atlas.survey(problems)
+    other = atlas.costs(partial(rb.closed_forms.bezier, long=True), problems)
+    excess = atlas.excesses(problems, {**found, "other way": other})
+    for k in range(2):
+        median = {name: quantile(x.reshape(2, -1)[k], 0.5) for name, x in excess.items()}
+        del median["other way"]
+        assert min(median.values()) in (median["Bézier"], median["corrected"])
+        assert median["Bézier"] < 0.002
+        assert min(median["projection"], median["Cayley"]) > 5 * median["quaternion"]
+    either = np.fmin(excess["Bézier"], excess["other way"])
+    assert quantile(either, 0.99) < 0.12
+    assert either.max() < 0.3
+
+
+def test_lesson_13_ranks_curves_whose_intervals_do_not_overlap():
+    """The ranks hold in each domain for all seeds, and the medians are those of the lesson."""
+    known = atlas.stored("intervals")
+
+    def median(seed, body, domain, curve, end=""):
+        words = {"seed [1]": seed, "body": body, "domain": domain, "curve": curve}
+        row = np.all([known[name] == word for name, word in words.items()], axis=0)
+        return known[f"median{end} [1]"][row].item()
+
+    def is_lower(curve, other, *of):
+        return all(
+            median(seed, *of, curve, " high") < median(seed, *of, other, " low")
+            for seed in (31, 32, 33)
+        )
+
+    for domain in atlas.DOMAINS:
+        assert is_lower("two Béziers", "normal", "ball", domain)
+        assert is_lower("normal", "two Béziers", "book", domain)
+        assert all(is_lower("normal", "weighted", body, domain) for body in atlas.BODIES)
+        assert is_lower("weighted", "two Béziers", "book", domain) == (domain != "all")
+    for body in ("brick", "book"):
+        assert all(is_lower("three", each, body, "all") for each in ("normal", "two Béziers"))
+    of = {
+        ("ball", "all", "two Béziers"): 0.08,
+        ("brick", "medium", "normal"): 0.04,
+        ("book", "medium", "normal"): 0.35,
+        ("brick", "all", "three"): 0.75,
+        ("book", "all", "three"): 6,
+    }
+    for words, percent in of.items():
+        assert 100 * median(31, *words) == pytest.approx(percent, rel=0.08), words
+    assert all(median(31, body, "small", "weighted") < 7e-4 for body in atlas.BODIES)

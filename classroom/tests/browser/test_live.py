@@ -213,6 +213,7 @@ def test_outputs_appear_below_their_own_cells(page, address):
             expect(shown).to_have_text(said)
 
 
+@pytest.mark.slow
 def test_a_second_visit_uses_stored_files(context, address):
     codes = "import scipy.linalg as la; print(la.expm([[0.0]]))", "import rbcourse; print(1)"
     for visit in range(2):
@@ -303,6 +304,7 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
     assert (row["automatic"], row["by hand"], row["remarks"]) == ("17", "tip-words-answer", "")
 
 
+@pytest.mark.slow
 def test_functions_of_a_set_stay_in_the_browser_for_later_sets(page, address, tmp_path):
     opened(page, address, "problems/ps2.html")
     page.evaluate("localStorage.clear()")  # other tests have used this address
