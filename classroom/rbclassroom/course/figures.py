@@ -107,8 +107,9 @@ async def _executed(paths: Sequence[Path], figures: Path) -> dict[Path, str]:
 
 def main() -> None:
     """Run lessons again, in the folder of the course, and store the changes."""
+    numbers = [word.zfill(2) for word in options.parse("figures")[0].lessons]  # 9 means 09
     try:
-        regenerate(Path("notebooks"), Path("figures"), options.parse("figures")[0].lessons)
+        regenerate(Path("notebooks"), Path("figures"), numbers)
     except (OSError, ValueError) as error:
         sys.exit(str(error))
 

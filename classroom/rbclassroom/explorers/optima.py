@@ -129,9 +129,16 @@ def cube_explorer() -> Explorer:
 @lru_cache(maxsize=64)
 def _solved_rotations(rival: str, size: float, k: float) -> Solved:
     """Solve the problem of BK (21) with another size and another k."""
+    ends, best = _best_rotation(size, k)
+    return _compared(rival, best, FORMS[rival](*ends))
+
+
+@lru_cache(maxsize=256)
+def _best_rotation(size: float, k: float) -> tuple[tuple[rb.Array, ...], rb.Curve]:
+    """Return the ends and the optimum, which are the same for all rivals."""
     sigma = size * _SIGMA
     ends = np.eye(3), rb.exp_so3(sigma), sigma, sigma + k * np.eye(3)[0]
-    return _compared(rival, rb.minimum_acceleration(*ends), FORMS[rival](*ends))
+    return ends, rb.minimum_acceleration(*ends)
 
 
 @lru_cache(maxsize=64)

@@ -33,7 +33,7 @@ _OTHER = "path", "."
 """The look of any other curve."""
 _DASHES = ("white", 5, "-"), ("black", 3, "--")
 """Colour, width and style of two lines, which together mark 10 % on every colour."""
-_SUM = "least sum of the two\nsmallest singular values (rotation: 2)"
+_SUM = "least sum of the two smallest\neigenvalues of $R^{\\mathsf{T}}M$ (rotation: 2)"
 _NORM = "least norm\nof the cubic (rotation: 1)"
 _MARGINS = {"projection": (_SUM, [0.01, 0.1, 1, 2]), "quaternion": (_NORM, [0.5, 1])}
 

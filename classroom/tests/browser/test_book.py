@@ -29,7 +29,7 @@ KINDS = [
     *("problems/ps1.html", "package/index.html", "package/so3.html", "code/rbcourse/so3.html"),
     *("lessons/index.html", "lessons/12_how_near_optimal.html", "near_optimal.html"),
 ]
-QUICK = ["index.html", "lessons/06_geodesics.html", "problems/ps1.html", "package/so3.html"]
+QUICK = ["index.html", "lessons/06_geodesics.html", "package/so3.html"]
 
 
 class Page:

@@ -9,10 +9,9 @@ from playwright.sync_api import expect
 from rbclassroom import explorers
 from rbclassroom.course.notebooks import KERNEL
 
-# One explorer of each kind: in the plane, with a menu, with buttons, and in space. Each entry also
-# has the place and the name of the slider that the test moves. The last explorer solves a problem
-# for each picture.
-KINDS = {"theta": (0, "t"), "chain": (1, "duration"), "flip": (1, "off"), "cube": (2, "spin")}
+# Explorers in the plane with a menu, and in space with buttons, and one that solves a problem for
+# each picture. Each entry also has the place and the name of the slider that the test moves.
+KINDS = {"chain": (1, "duration"), "flip": (1, "off"), "cube": (2, "spin")}
 
 # A function that records when keys go down, and when the screen shows a new picture.
 NOTE = """() => {
