@@ -176,9 +176,10 @@ def read_recording(
     dropped: list[int] = np.flatnonzero(~complete).tolist()
     if dropped and "nan" not in skip:
         i = dropped[0]
+        lost = [name for name, column in found.items() if not np.isfinite(column[i])]
+        what = f"the number of {lost[0]} is missing" if lost else "the quaternion is 0"
         raise ValueError(
-            f"{rows.place(i)}: a number is missing or the quaternion is 0 in "
-            f"{rows.texts[i][:60]!r}; skip='nan' leaves such rows out"
+            f"{rows.place(i)}: {what} in {rows.texts[i][:60]!r}; skip='nan' leaves such rows out"
         )
     if not complete.any():
         raise ValueError(f"{file}: no row has all its numbers")
@@ -315,7 +316,8 @@ def _separated(file: File, lines: list[int], texts: list[str]) -> tuple[str | No
 
 def _has_number(text: str) -> bool:
     """Return whether a cell of a line is a number, or NaN."""
-    words = re.split(r"[\s,;\"]+", text)
+    words = re.split(r"[,;\t\"]+" if re.search(r"[,;\t]", text) else r"[\s\"]+", text)
+    words = [word.strip() for word in words]
     return any(_NUMBER.fullmatch(word) or word.lower() == "nan" for word in words)
 
 
@@ -439,7 +441,8 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
         raise ValueError(
             f"{rows.file}: no column has the name {' or '.join(missing)}; rename those of the pose "
             "to x, y, z, qw, qx, qy, qz and that of the times to time. Or delete the line of names "
-            "and give format=, or use numpy.loadtxt and pose_from_components. The names "
+            "and give format=, or use numpy.loadtxt, pose_from_components and exp_so3 (rotation "
+            "vectors) or matrix_from_zyx (yaw, pitch, roll, in rad). The names "
             f"are {', '.join(rows.names)[:300]!r}"
         )
     if "x" not in found and others:
@@ -479,7 +482,7 @@ def _unnamed(rows: _Rows, form: str | None, timed: bool) -> tuple[Columns, str |
     if form is None:
         hints = {
             7: "If these are TUM poses without times, times= or rate= gives the times",
-            13: "If these are KITTI poses after another column, remove it",
+            13: "If these are KITTI poses after a column of times, move the times to times=",
             11: "If these are times in ns, positions and quaternions (w, x, y, z), as of "
             "VINS-Fusion, format='euroc' reads them",
             16: "numpy.loadtxt(file).reshape(-1, 4, 4) reads 4 × 4 matrices",

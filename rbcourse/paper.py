@@ -133,7 +133,7 @@ def figure_4(
     panel : {"a", "b", "c"}, optional
         The panel of the figure, which determines `w1`.
     sigma : array_like, shape (3,), optional
-        The rotation vector of the goal, in rad.
+        The rotation vector of the goal, in rad; its norm is below π.
     w0, w1 : array_like, shape (3,), optional
         The angular velocities at both ends, by default those of the panel: σ, and σ + (k, 0, 0)
         with k = 0, 1 or 5.
@@ -147,6 +147,8 @@ def figure_4(
     """
     _one_of("panel", panel, "abc")
     end = as_single("sigma", sigma, 3)
+    if (size := float(np.linalg.norm(end))) >= np.pi:
+        raise ValueError(f"sigma: a norm below π is wanted, in rad, got {size:.6g}")
     first = end if w0 is None else as_single("w0", w0, 3)
     last = end + _EXTRA[panel] * np.eye(3)[0] if w1 is None else as_single("w1", w1, 3)
     ends = np.eye(3), exp_so3(end), first, last

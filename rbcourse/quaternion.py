@@ -31,7 +31,7 @@ from rbcourse._checks import (
     first_index,
 )
 from rbcourse._docs import described_by
-from rbcourse._numerics import EPS, Array
+from rbcourse._numerics import EPS, Array, in_blocks
 from rbcourse._quaternions import (
     axis_and_angle,
     canonical,
@@ -79,7 +79,8 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
            [ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
     """
-    return matrix(np.moveaxis(as_unit_quaternions("q", q), -1, 0))
+    q = as_unit_quaternions("q", q)
+    return in_blocks(lambda some: matrix(np.moveaxis(some, -1, 0)), q)
 
 
 @described_by(__doc__, returns="ndarray, shape (..., 4)")

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, as_single, check_broadcast
 from rbcourse._docs import described_by
-from rbcourse._numerics import Array, matvec
+from rbcourse._numerics import Array, in_blocks, matvec
 from rbcourse._valid import as_poses, as_rotations, as_rotations_or_poses
 from rbcourse.so3 import (
     exp_so3,
@@ -199,7 +199,10 @@ def exp_se3(S: ArrayLike) -> Array:
            [ 0.   ,  0.   ,  1.   ,  3.   ],
            [ 0.   ,  0.   ,  0.   ,  1.   ]])
     """
-    S = as_finite("S", S, 6)
+    return in_blocks(_exp, as_finite("S", S, 6))
+
+
+def _exp(S: Array) -> Array:
     w, v = S[..., :3], S[..., 3:]
     left_jacobian = np.swapaxes(right_jacobian_so3(w), -1, -2)
     return join(exp_so3(w), matvec(left_jacobian, v))

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_finite, check_broadcast
 from rbcourse._docs import described_by
-from rbcourse._numerics import Array, sinc
+from rbcourse._numerics import Array, in_blocks, sinc
 from rbcourse._quaternions import axis_and_angle, quaternion_of, rotation_vector_of
 from rbcourse._valid import as_rotations
 
@@ -92,7 +92,11 @@ def exp_so3(w: ArrayLike) -> Array:
            [ 1.,  0.,  0.],
            [ 0.,  0.,  1.]])
     """
-    N, angle = _hat_and_angle(as_finite("w", w, 3))
+    return in_blocks(_exp, as_finite("w", w, 3))
+
+
+def _exp(w: Array) -> Array:
+    N, angle = _hat_and_angle(w)
     return np.eye(3) + np.sin(angle) * N + 2 * np.sin(angle / 2) ** 2 * N @ N
 
 

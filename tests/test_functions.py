@@ -88,6 +88,20 @@ def test_results_have_the_documented_shape(function):
 
 
 @every_function
+def test_large_stacks_give_the_results_of_small_ones(function):
+    """Some functions divide stacks of more than 1,024 arguments."""
+    (shape,) = RESULT.search(inspect.getdoc(function)).groups()
+    axis = len([n for n in shape.rpartition("...")[0].split(", ") if n])
+    given = sample(function, 2, 700)
+    parts = [
+        function(**{name: value[:, part] for name, value in given.items()})
+        for part in (slice(0, 400), slice(400, 700))
+    ]
+    wanted = np.concatenate(parts, axis=axis + 1)
+    assert np.allclose(function(**given), wanted, rtol=1e-12, atol=1e-12)
+
+
+@every_function
 def test_batches_of_arguments_broadcast(function):
     given = sample(function, 2, 3)
     for name in given:

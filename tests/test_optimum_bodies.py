@@ -2,6 +2,7 @@
 
 import warnings
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import oracles
@@ -14,7 +15,8 @@ import rbcourse as rb
 from rbcourse._polynomials import grid, hermite
 from rbcourse.curves.ends import Ends
 from rbcourse.optimum._collocation import relax
-from rbcourse.optimum._search import ball
+from rbcourse.optimum._guesses import Curves
+from rbcourse.optimum._search import LIMITS, Search, ball
 
 MANY = random_problems(800, 50)
 # For these ends the short way costs 3504, and Bézier's curves cost 603 and 553.
@@ -311,3 +313,11 @@ def test_rounding_does_not_choose_between_two_half_turns(what, axis):
     is_the_same_however_rounded(
         lambda R1: OPTIMA[what](I3, R1, REST, REST, 2 * I3, REST, REST), half, 180, 6
     )
+
+
+def test_the_cheapest_promising_curves_of_each_problem_are_kept(monkeypatch):
+    monkeypatch.setattr(LIMITS, "most", 2, raising=False)
+    R = rb.sample_rotation((6, 3), rng=5)
+    curves = Curves(np.array([0, 0, 0, 1, 0, 0]), R, np.array([4.0, 1, 3, 9, 2, 11]))
+    kept = Search.promising(SimpleNamespace(count=2), curves, 10)
+    assert kept.tolist() == [False, True, False, True, True, False]

@@ -197,3 +197,8 @@ def test_the_comparison_draws_and_names_the_coordinates():
     assert words in coordinates.describe_coordinates(data)
     same = data | {f"projection sigma{i} [rad]": data[f"optimum sigma{i} [rad]"] for i in "123"}
     assert "They coincide at all times." in coordinates.describe_coordinates(same)
+
+
+def test_a_goal_of_a_half_turn_or_more_is_refused():
+    with pytest.raises(ValueError, match="sigma: a norm below π is wanted, in rad, got 180"):
+        paper.figure_4(sigma=[180, 0, 0])

@@ -30,6 +30,8 @@ GOOD = {
         {"start": "first"},
         [0, 0.01],
     ),
+    "pandas_twice.csv": (f"Unnamed: 0,{OWN}\n0,0.5,{ROWS}\n", {}, [0.5]),
+    "markers.csv": (f"{OWN},marker 1,marker 2\n0.5,{ROWS},7,8\n", {}, [0.5]),
     "orb_slam2.txt": (f"1305031102.160407 1.5000000 -0.2500000 0.7500000 {XYZW}\n", {}, None),
     "orb_slam3.txt": (
         f"1403636580838555648.000000 {ROW}\n1403636580843555584.000000 {ROW}\n",
@@ -179,7 +181,7 @@ GOOD = {
 }  # fmt: skip
 REFUSED = {
     "kitti.txt": (KITTI, "is a KITTI file, without times: times= takes a file"),
-    "kitti_with_frame.txt": ("0 " + KITTI, "13 columns.*remove it"),
+    "kitti_with_frame.txt": ("0 " + KITTI, "13 columns.*move the times to times="),
     "replica.txt": ("1 0 0 0 " * 4 + "\n", "16 columns.*reshape"),
     "tartanair.txt": (f"{ROW}\n", "7 columns.*TUM poses without times, times= or rate="),
     "nclt.csv": ("1326030975726043,1,2,3,0.1,0.2,0.3\n", "7 columns without names"),
@@ -235,8 +237,9 @@ REFUSED = {
     ),
     "dates.csv": (f"time,x,y,z,qw,qx,qy,qz\n2011-09-26 13:02:25,{ROWS}\n", "convert dates to"),
     "stamps.txt": (f"0 {ROW}\n" * 3, "all times are equal"),
-    "lost.txt": (f"0 {ROW}\n1 NaN NaN NaN NaN NaN NaN NaN\n", "line 2: .*skip='nan'"),
-    "vicon.csv": (f"{OWN}\n0,{ROWS}\n1,0,0,0,0,0,0,0\n", "line 3: .*skip='nan'"),
+    "lost.txt": (f"0 {ROW}\n1 NaN NaN NaN NaN NaN NaN NaN\n", "line 2: .* of x is.*skip='nan'"),
+    "angles.csv": ("time,x,y,z,roll,pitch,yaw\n0,1,2,3,0,0,0\n", "no column.*matrix_from_zyx"),
+    "vicon.csv": (f"{OWN}\n0,{ROWS}\n1,0,0,0,0,0,0,0\n", "line 3: the quat.* 0.*skip='nan'"),
     "empty_cells.csv": (f"{OWN}\n0,{ROWS}\n1,,,,,,,\n", "line 3: .*skip='nan'"),
     "twice.txt": (f"0 {ROW}\n0.1 {ROW}\n0.10 {ROW}\n", "line 3: .*skip='repeated'"),
     "back.txt": (f"0 {ROW}\n0.2 {ROW}\n0.1 {ROW}\n", "line 3: .*skip='unordered'"),

@@ -81,6 +81,7 @@ class Thresholds:
     refined = 3.0  # curves up to this cost ratio are lowered on more nodes [1.5: 0]
     spun = 3.0, 1.15  # spin is added twice, to curves up to these cost ratios [once: 2]
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost [1: 1]
+    most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
     promising = 1.3  # curves above this cost ratio are dropped before more steps [1.1: 1]
     starts = Steps(40, 5e-4)  # Gauss–Newton steps for starting curves [20 or 5e-3: 0]
     starts_of_bodies = Steps(20, 2e-3)  # for bodies; many curves are lowered again [10, 1e-2: 0]
@@ -176,10 +177,19 @@ class Search:
         return lowered(self.functional, curves, self.first_steps)
 
     def promising(self, curves: Curves, ratio: float) -> Mask:
-        """Tell which curves have a cost up to this ratio, and are not close to a cheaper curve."""
+        """Tell which curves have a cost up to this ratio, and are not close to a cheaper curve.
+
+        For each problem, these are at most `LIMITS.most` curves, the cheapest ones.
+        """
         least = curves.least(self.count)
         costly = curves.cost > ratio * least[curves.problem]
-        return ~costly & ~_repeated(curves)
+        likely = np.flatnonzero(~costly & ~_repeated(curves))
+        order = likely[np.lexsort((curves.cost[likely], curves.problem[likely]))]
+        problem = curves.problem[order]
+        rank = np.arange(len(order)) - np.searchsorted(problem, problem)
+        kept = np.zeros(len(curves), bool)
+        kept[order[rank < LIMITS.most]] = True
+        return kept
 
     def follow(self, curves: Curves) -> None:
         """Start Newton's method from these curves, and keep the solutions that cost less.

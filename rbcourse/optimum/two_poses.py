@@ -270,9 +270,10 @@ def _warn(curve: OptimalRotation, some: Array, what: str, why: str) -> None:
     places = np.argwhere(some)
     if len(places):
         first = [int(i) for i in places[0]]
+        some_of = f"{len(places)} of {curve.count} problems"
+        which = f"{some_of} {what}, the first of them {first}" if first else f"the problem {what}"
         warnings.warn(
-            f"{len(places)} of {curve.count} problems {what}, the first of them {first}: {why} "
-            "(see converged)",
+            f"{which}: {why} (see converged)",
             RuntimeWarning,
             stacklevel=4,
         )
