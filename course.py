@@ -88,8 +88,9 @@ def main():
 
 
 def from_here(word):
-    """Return an existing path, or a test in a file, as an absolute path."""
-    return os.path.abspath(word) if os.path.exists(word.partition("::")[0]) else word
+    """Return a notebook, an existing path, or a test in a file, as an absolute path."""
+    is_path = word.endswith(".ipynb") or os.path.exists(word.partition("::")[0])
+    return os.path.abspath(word) if is_path else word
 
 
 def run(*words):

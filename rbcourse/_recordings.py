@@ -191,7 +191,7 @@ def read_recording(
     else:
         stamps = _stamps(rows, kept, columns, known or "s")
     if unit != "s" and rate is None:
-        _check_unit(rows.place(kept[0]), stamps, known, sure=bool(unit or stated))
+        _check_unit(rows.place(kept[0]), stamps, known)
     ordered, more = _increasing(rows, kept, stamps, skip)
     for kind, which in {"nan": dropped, **more}.items():
         if which:
@@ -601,7 +601,7 @@ def _given_times(
     return [EXACT.scaleb(stamp, -DIGITS[unit]) for stamp in stamps]
 
 
-def _check_unit(place: str, stamps: Sequence[Decimal], known: str | None, sure: bool) -> None:
+def _check_unit(place: str, stamps: Sequence[Decimal], known: str | None) -> None:
     """Refuse times whose unit is not s, or not the unit that is known.
 
     Times are not in s after the year 5000, or with steps of a quarter of an hour. They may be in

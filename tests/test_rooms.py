@@ -288,3 +288,10 @@ def test_every_name_of_the_package_is_documented():
             inspect.isclass(exported) and not is_typeddict(exported)
         ):
             assert "Buffer" not in str(inspect.signature(exported)), name
+
+
+def test_the_map_for_contributors_names_every_module():
+    page = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+    names = {path.stem for path in (ROOT / "rbcourse").rglob("*.py") if "draw" not in path.parts}
+    missing = {name for name in names if not re.search(rf"\b{name}\b", page)}
+    assert missing <= {"__main__"}

@@ -512,3 +512,11 @@ def test_a_limit_that_is_exceeded_between_the_points_gives_a_warning(monkeypatch
     i = np.argmin(np.abs(timed.s - place))
     t = np.linspace(timed.times[i], timed.times[i + 1], 101)
     assert np.linalg.norm(timed(t, 1)[:, :3], axis=1).max() > 1.5 * (1 + 1e-4)
+
+
+@pytest.mark.parametrize(("angle", "stops"), [(2.0, 0), (2.0001, 1)])
+def test_the_motion_stops_where_the_velocity_jumps_a_little(angle, stops):
+    path = rb.chain([0, 1, 2], rb.exp_so3([[0, 0, 0], [0, 0, 1], [0, 0, angle]]), leg=rb.geodesic)
+    quick = rb.fastest(path, angular_speed=10, angular_acceleration=1)
+    inside = (quick.s > 0.5) & (quick.s < 1.5)
+    assert np.any(quick.rate[inside] == 0) == stops

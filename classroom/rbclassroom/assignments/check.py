@@ -20,7 +20,7 @@ from nbformat import NotebookNode
 from rbclassroom.assignments import locked_cells
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test, name_cell
 from rbclassroom.assignments.my_motion import FILE, find, keep
-from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient
+from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient, without_number
 from rbclassroom.assignments.safe_files import write_whole
 from rbclassroom.assignments.submissions import count_found, read_notebook, restore
 from rbclassroom.course import options
@@ -49,9 +49,9 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     saved = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     print(f"checking {path.name}, last saved {saved}", flush=True)
     count = len(notebook.cells)
+    remarks = restore(notebook, original)
     if path.name != name:
         print(f"the file to hand in gets the name {name}")
-    remarks = restore(notebook, original)
     where = "as JupyterLab does at the bottom of its window"
     if len(notebook.cells) != count:
         where = f"in {HANDED}/{name}, where damaged cells are restored"
@@ -173,8 +173,8 @@ def _error(cell: NotebookNode) -> str:
     if not errors:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
-    if errors[-1].ename == "SyntaxError":  # the name of the file is a number
-        lines = [re.sub(r"\(\S+, (line \d+)\)$", r"(\1)", lines[-1])]
+    if errors[-1].ename == "SyntaxError":
+        lines = [without_number(lines[-1])]
     hint = lines[-1] and errors[-1].ename == "NotYet"  # show a hint without the name of its error
     return lines[-1][:400] if hint else f"{errors[-1].ename}: {lines[-1][:400]}".rstrip(": ")
 

@@ -17,6 +17,7 @@ from nbformat import NotebookNode
 from nbgrader import preprocessors as nbgrader
 
 from rbclassroom.assignments.locked_cells import is_test, marks_of, title_of
+from rbclassroom.assignments.notebook_runner import without_number
 from rbclassroom.assignments.student_code import EMPTY
 
 UNSEEN = "The visible tests pass, but a hidden test fails.\n"
@@ -105,7 +106,7 @@ def _said(cell: NotebookNode) -> list[str]:
         if output.get("ename") == "NotImplementedError":
             return [EMPTY]
         if output.output_type == "error":
-            return [f"{output.ename}: {output.evalue}"]
+            return [f"{output.ename}: {without_number(output.evalue)}"]
     return []
 
 

@@ -27,7 +27,7 @@ from traitlets.config import Config
 from rbclassroom.assignments import locked_cells, sandbox
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.collect import read_owners, read_report
-from rbclassroom.assignments.handout import find_set, read_config
+from rbclassroom.assignments.handout import find_set, pack, read_config
 from rbclassroom.assignments.locked_cells import grade_id, is_answer
 from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.submissions import Refused, read_notebook
@@ -90,10 +90,11 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
 
 
 def _write_table(name: str, rows: list[Row], assignments: Path) -> Path:
-    """Write the table of a set, with a line for each file that was not collected."""
+    """Write the table of a set, with a line for each file that was not collected, and the pages."""
+    why_late = _why_late(assignments)
     for row in rows:
-        if row.get("late") == "" and f"{row['student']}, {name}" in _perhaps_late(assignments):
-            row["late"] = "perhaps"
+        if row.get("late") == "":  # nbgrader knows no due date
+            row["late"] = why_late.get(f"{row['student']}, {name}", "")
     owners = read_owners(assignments)
     for at, row in enumerate(rows):
         number, who = owners.get(f"{row['student']}/{name}", ("", ""))
@@ -106,7 +107,22 @@ def _write_table(name: str, rows: list[Row], assignments: Path) -> Path:
     table = assignments / f"{name}-grades.csv"
     write_csv(table, rows)
     print(table, flush=True)
+    _pack_pages(name, rows, assignments)
     return table
+
+
+def _pack_pages(name: str, rows: list[Row], assignments: Path) -> None:
+    """Write the feedback of students with a number into a zip, in the folders of Moodle's zip."""
+    pages = {}
+    for row in rows:
+        page = assignments / "feedback" / row["student"] / name / f"{name}.html"
+        if row["number"] and page.exists():
+            folder = f"{row['name']}_{row['number']}_assignsubmission_file_"
+            pages[f"{folder}/{name}.html"] = page.read_bytes()
+    if pages:
+        packed = assignments / f"{name}-feedback.zip"
+        replace_file(packed, pack(pages))
+        print(packed, flush=True)
 
 
 def _prepare(name: str, assignments: Path) -> list[Job]:
@@ -258,9 +274,10 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
             yield what, f"not collected: {row['why']}"
 
 
-def _perhaps_late(assignments: Path) -> set[str]:
-    rows = (row for row in read_report(assignments) if row["list"] == "late")
-    return {row["what"] for row in rows if row["why"].startswith("perhaps")}
+def _why_late(assignments: Path) -> dict[str, str]:
+    """Return why submissions are late, or "perhaps", as `collect` has found."""
+    late = {row["what"]: row["why"] for row in read_report(assignments) if row["list"] == "late"}
+    return {what: "perhaps" if why.startswith("perhaps") else why for what, why in late.items()}
 
 
 def course_config(name: str, assignments: Path) -> Config:

@@ -149,7 +149,7 @@ class Problem:
             entry = f"entry {[int(at) for at in worst]} of the result"
             wanted, numbers = wanted[worst], numbers[worst]
         text = f"{called} {entry} should be {show(wanted)}; yours is {show(numbers)}"
-        return f"{text}, off by {off.max(initial=0):.1g}."
+        return f"{text}, off by {off.max(initial=0):.3g}."
 
 
 @dataclass(frozen=True)

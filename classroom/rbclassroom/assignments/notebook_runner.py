@@ -1,6 +1,7 @@
 """Run a student's notebook with limits on time and output, and keep every error."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -108,3 +109,8 @@ class BoundedClient(NotebookClient):
                 cell.outputs.append(new_output("error", **error))
         if cell_index in self.cut:
             cell.outputs.append(new_output("stream", name="stdout", text=f"\n({CUT})\n"))
+
+
+def without_number(message: str) -> str:
+    """Return the message of a syntax error without the file, which is a number for a cell."""
+    return re.sub(r"\(\S+, (line \d+)\)$", r"(\1)", message)

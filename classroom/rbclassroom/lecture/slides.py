@@ -115,7 +115,7 @@ class _Reader:
         path = self.root / "notebooks" / f"{folder}.ipynb"
         for cell in nbformat.read(path, as_version=4).cells:
             if cell.id == name:
-                return picture_of(cell, self.root)
+                return picture_of(cell)
         raise ValueError(f"slide: there is no cell {folder}/{name}")
 
     def read(self, cell: NotebookNode) -> None:
@@ -131,7 +131,7 @@ class _Reader:
             self.put_text(wish)
             last = self.shown[-1]
             if not last.picture:  # a sketch can replace the figure
-                last.picture, last.aspect = picture_of(cell, self.root)
+                last.picture, last.aspect = picture_of(cell)
             if "_explorer()" in cell.source:
                 note = "M plays the picture. R shows its numbers, which stay on after the verdict."
                 last.notes.append(note)
@@ -190,7 +190,7 @@ def sketch_of(path: Path, name: str) -> tuple[str, float]:
     return ET.tostring(sketch, encoding="unicode"), width / 720  # the height can vary
 
 
-def picture_of(cell: NotebookNode, root: Path) -> tuple[str, float]:
+def picture_of(cell: NotebookNode) -> tuple[str, float]:
     """Return the picture of a code cell, interactive if possible, and its width over its height."""
     page = "".join(o.get("data", {}).get("text/html", "") for o in cell.get("outputs", []))
     if explorer := re.search(r"explorers\.(\w+)_explorer\(\)", cell.source):

@@ -13,10 +13,12 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from glob import glob
 from pathlib import Path
+from zipfile import ZipFile
 
 import nbformat
 import psutil
 import pytest
+from nbformat.v4 import new_code_cell, new_output
 from tiny_class import Class, begun, make_template
 from tiny_set import cell, write_tiny_set
 from traitlets.config import Config
@@ -25,6 +27,7 @@ from rbclassroom.assignments import grade as grading
 from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.autograding import configure
+from rbclassroom.assignments.feedback import _said
 from rbclassroom.assignments.grade import grade, grade_one
 from rbclassroom.assignments.handout import read_config
 from rbclassroom.assignments.safe_files import write_csv
@@ -213,6 +216,7 @@ LISTED = [
     ("missing", "cid, ps1", "Cid Cole"),
     ("late", "tampers, ps0", "perhaps: 2026-05-01 12:00:00 UTC may be the date of the download"),
     ("late", "good one, ps0", "perhaps: 2026-05-01 12:00:00 UTC may be the date of the download"),
+    ("late", "half right, ps0", "Canvas marks it as late"),
 ]
 
 
@@ -253,6 +257,7 @@ def test_grading_again_keeps_manual_scores_and_comments(again):
     assert (row["words-answer"], row["automatic"], row["total"]) == ("2.5", "3", "5.5")
     assert row["by hand"] == row["remarks"] == ""
     assert (row["late"], rows["tampers"]["late"]) == ("1.5 h", "perhaps")
+    assert rows["half right"]["late"] == "Canvas marks it as late"
     said = " ".join(again.feedback("good one").split())
     assert "A tiny set 5.5 of 6 points. Right" in said
     assert "In words A tiny set: 2.5 of 3 Your lecturer: Well put." in said
@@ -262,6 +267,22 @@ def test_grading_again_keeps_manual_scores_and_comments(again):
     assert not (again.folder / "feedback" / "nosy" / "ps0").exists()
     with again.gradebook() as gradebook:
         assert gradebook.find_submission("ps0", "nosy").score == 2.5
+
+
+def test_pages_are_packed_in_the_folders_of_a_download_from_moodle(again):
+    with ZipFile(again.folder / "ps0-feedback.zip") as packed:
+        (name,) = packed.namelist()  # the other student with a number was refused
+        page = again.folder / "feedback" / "tampers" / "ps0" / "ps0.html"
+        assert name == "Ann Ames_4711_assignsubmission_file_/ps0.html"
+        assert packed.read(name) == page.read_bytes()
+
+
+def test_a_page_shows_syntax_errors_without_a_number_as_their_file():
+    error = new_output(
+        "error", ename="SyntaxError", evalue="'[' was never closed (35429.py, line 3)"
+    )
+    cell = new_code_cell(outputs=[error])
+    assert _said(cell) == ["SyntaxError: '[' was never closed (line 3)"]
 
 
 def test_the_table_lists_students_who_were_not_graded(again):
