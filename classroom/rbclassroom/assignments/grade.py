@@ -93,7 +93,7 @@ def _write_table(name: str, rows: list[Row], assignments: Path) -> Path:
     """Write the table of a set, with a line for each file that was not collected, and the pages."""
     why_late = _why_late(assignments)
     for row in rows:
-        if row.get("late") == "":  # nbgrader knows no due date
+        if not row.get("late"):  # nbgrader knows no due date, or the submission was refused
             row["late"] = why_late.get(f"{row['student']}, {name}", "")
     owners = read_owners(assignments)
     for at, row in enumerate(rows):

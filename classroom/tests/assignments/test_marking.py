@@ -97,7 +97,7 @@ def test_the_worst_entry_of_a_large_result_is_shown():
     many = np.arange(40.0).reshape(20, 2)
     problem = Problem(["m"], [(many,)], [many])
     source = "def answer(m):\n    m = m.copy()\n    m[3, 1] = 0.25\n    return m"
-    wanted = "entry [3, 1] of the result should be 7.0; yours is 0.25, off by 7."
+    wanted = "entry [3, 1] of the result should be 7.0; yours is 0.25, off by 6.75."
     assert wanted in told(problem, source)
 
 
