@@ -119,8 +119,9 @@ def _pack_pages(name: str, rows: list[Row], assignments: Path) -> None:
         if row["number"] and page.exists():
             folder = f"{row['name']}_{row['number']}_assignsubmission_file_"
             pages[f"{folder}/{name}.html"] = page.read_bytes()
+    packed = assignments / f"{name}-feedback.zip"
+    packed.unlink(missing_ok=True)  # an earlier one may have pages of other students
     if pages:
-        packed = assignments / f"{name}-feedback.zip"
         replace_file(packed, pack(pages))
         print(packed, flush=True)
 
