@@ -336,25 +336,39 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     """Grade one submission; return remarks on it."""
     config = course_config(name, folder)
     config.BoxedExecute.boxed = boxed
-    if hasattr(signal, "alarm"):  # a time limit for grading and feedback together
-        signal.alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))
     config.CourseDirectory.student_id = student
-    graded = folder / "autograded" / student / name / f"{name}.ipynb"
-    before = _words(graded)
-    if glob.escape(student) != student:  # nbgrader reads this name as a pattern
-        raise Refused("the name of the folder contains [, * or ?; rename the folder")
-    given = {path.name for path in find_set(name, folder).iterdir()}
-    check_submission(folder / "submitted" / student / name, name, given)
-    done = run_step(Autograde, config)
-    if not done["success"]:
-        raise Refused(last_line(done))
-    remarks: list[str] = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
-    changed = (key for key, words in _words(graded).items() if words != before.get(key, words))
-    remarks += [f"the answer {key} differs from the one that was graded before" for key in changed]
-    done = run_step(GenerateFeedback, config)
-    if not done["success"]:
-        remarks.append(f"no feedback was written: {last_line(done)}")
-    return remarks
+    with _time_limit(300 + 2 * config.BoxedExecute.get("seconds", 600)):
+        graded = folder / "autograded" / student / name / f"{name}.ipynb"
+        before = _words(graded)
+        if glob.escape(student) != student:  # nbgrader reads this name as a pattern
+            raise Refused("the name of the folder contains [, * or ?; rename the folder")
+        given = {path.name for path in find_set(name, folder).iterdir()}
+        check_submission(folder / "submitted" / student / name, name, given)
+        done = run_step(Autograde, config)
+        if not done["success"]:
+            raise Refused(last_line(done))
+        remarks: list[str] = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
+        changed = (key for key, words in _words(graded).items() if words != before.get(key, words))
+        remarks += [
+            f"the answer {key} differs from the one that was graded before" for key in changed
+        ]
+        done = run_step(GenerateFeedback, config)
+        if not done["success"]:
+            remarks.append(f"no feedback was written: {last_line(done)}")
+        return remarks
+
+
+@contextmanager
+def _time_limit(seconds: int) -> Iterator[None]:
+    """End this process if the grading and the feedback in this context take longer."""
+    if not hasattr(signal, "alarm"):  # on Windows
+        yield
+        return
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
 
 
 def _to_do(grades: Iterable[Any]) -> list[str]:
