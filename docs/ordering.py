@@ -12,23 +12,12 @@ monomial, all except one are free. ordering.csv contains the free entries.
 """
 
 import csv
-import importlib.util
 from fractions import Fraction
 from pathlib import Path
 
+import near_optimal as near
+
 TABLE = Path(__file__).with_name("ordering.csv")
-
-
-def _load():
-    """Return near_optimal.py as a module."""
-    path = Path(__file__).with_name("near_optimal.py")
-    spec = importlib.util.spec_from_file_location("near_optimal", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-near = _load()
 (ss, se, sd), (_, ee, ed), (_, _, dd) = near.INNER
 VOLUME = ss * ee * dd + 2 * se * sd * ed - ss * ed**2 - ee * sd**2 - dd * se**2
 

@@ -5,23 +5,12 @@ import tomllib
 from pathlib import Path
 from posixpath import dirname, join, normpath, relpath
 
+import rbclassroom
 from rbclassroom.course.ledger import KEY, MISPRINTS, WHAT
 
 CONTENTS = tomllib.loads(Path(__file__).with_name("contents.toml").read_text("utf-8"))
 PAGES: dict[str, str] = CONTENTS["pages"]
-CLASSROOM = [
-    "explorers",
-    "figures",
-    "atlas",
-    "rivals",
-    "openings",
-    "polls",
-    "course",
-    "lecture",
-    "assignments",
-    "live",
-    "book",
-]
+CLASSROOM = {path.stem for path in Path(rbclassroom.__file__).parent.glob("[!_]*")}
 """The parts of `rbclassroom`; all other modules are in `rbcourse`."""
 
 _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")
