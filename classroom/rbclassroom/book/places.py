@@ -5,12 +5,11 @@ import tomllib
 from pathlib import Path
 from posixpath import dirname, join, normpath, relpath
 
-import rbclassroom
 from rbclassroom.course.ledger import KEY, MISPRINTS, WHAT
 
 CONTENTS = tomllib.loads(Path(__file__).with_name("contents.toml").read_text("utf-8"))
 PAGES: dict[str, str] = CONTENTS["pages"]
-CLASSROOM = {path.stem for path in Path(rbclassroom.__file__).parent.glob("[!_]*")}
+CLASSROOM = {path.stem for path in Path(__file__).parents[1].glob("[!_]*")}
 """The parts of `rbclassroom`; all other modules are in `rbcourse`."""
 
 _LINK = re.compile(r"`[^`\n]*`|\]\((?![a-z]+:|#)([^)#\s]+)(#[^)\s]+)?\)")

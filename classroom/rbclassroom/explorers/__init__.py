@@ -13,15 +13,13 @@
 | 07 | `screw` | | | |
 """
 
-from rbclassroom.explorers.bodies import body_explorer
 from rbclassroom.explorers.curves import flip_explorer, screw_explorer, theta_explorer
 from rbclassroom.explorers.interpolation import double_cover_explorer, interpolation_explorer
-from rbclassroom.explorers.optima import cube_explorer, minimum_acceleration_explorer
-from rbclassroom.explorers.paths import chain_explorer, spline_explorer
+from rbclassroom.explorers.optima import body_explorer, cube_explorer, minimum_acceleration_explorer
+from rbclassroom.explorers.paths import chain_explorer, spline_explorer, timing_explorer
 from rbclassroom.explorers.plane import arm_explorer, planar_explorer
 from rbclassroom.explorers.rotations import projection_explorer, random_explorer, rotation_explorer
 from rbclassroom.explorers.smoothing import smoothing_explorer
-from rbclassroom.explorers.timing import timing_explorer
 
 __all__ = [
     "arm_explorer",

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 import rbcourse as rb
+from rbclassroom.explorers.paths import POSES
 from rbcourse.files import replace_file
 from rbcourse.straight_line import theta
 
@@ -163,13 +164,7 @@ def triangle() -> Paths:
 
 def onerate() -> Paths:
     """Return the acceleration of the centre on the path of lesson 15, at one rate."""
-    coordinates = [
-        [0.0, 0.0, 0.0, -1.1, -1.4, -0.7],
-        [0.0, 0.9, 0.8, -0.8, 0.1, 0.9],
-        [0.8, 0.4, 1.8, 1.1, -0.2, 0.0],
-        [0.0, 0.6, 2.8, 1.4, 1.0, 1.0],
-    ]
-    path = rb.projected_spline(np.arange(4.0), rb.pose_from_coordinates(coordinates))
+    path = rb.projected_spline(np.arange(4.0), POSES)
     s = np.linspace(0, 3, 121)
     size = np.linalg.norm(path(s, 2)[:, 3:], axis=1)
     points = np.stack([70 + 178 * s, 570 - 370 * size / size.max()], axis=1)
