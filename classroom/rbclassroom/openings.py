@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -19,6 +18,7 @@ from rbclassroom.figures import lesson13, lesson16
 from rbcourse import Array, Curve
 from rbcourse.draw import arm, bodies, plane, spheres
 from rbcourse.draw.animate import Animation, Update, animate
+from rbcourse.draw.drawing import style
 from rbcourse.draw.save import COLOURS, PALE
 
 FRAMES = 51
@@ -27,7 +27,6 @@ T = np.linspace(0, 1, FRAMES)
 BOTH = "what the program did", "what was meant"
 """The titles of most panels."""
 _I, _REST = np.eye(3), np.zeros(3)
-_STYLES = ["default", "rbcourse.rbcourse"]
 _RED = COLOURS["path"]
 
 
@@ -37,7 +36,7 @@ def _panels(*kinds: str, foot: float = 0.13) -> Iterator[tuple[Figure, list[Any]
 
     A fraction `foot` of the height, below the axes, is for notes.
     """
-    with plt.style.context(_STYLES):
+    with style():
         fig = Figure(figsize=(5.8, 2.4), dpi=96)
         fig.set_layout_engine("constrained", rect=(0, foot, 1, 1 - foot))
         axes = [fig.add_subplot(1, len(kinds), k + 1, projection=x) for k, x in enumerate(kinds)]
@@ -224,10 +223,8 @@ def hand_that_hits_a_glass() -> Animation:
 
 def _arm(ax: Any, path: Array, place: Array) -> Update:
     """Draw an arm that moves, and a glass at a place, which becomes red when the hand hits it."""
-    move, tips = (
-        arm.moving_arm(ax, path, [0, -1]),
-        rb.arm.arm_forward_kinematics(path).joints[:, -1],
-    )
+    move = arm.moving_arm(ax, path, [0, -1])
+    tips = rb.arm.arm_forward_kinematics(path).joints[:, -1]
     hit = np.linalg.norm(tips - place, axis=1) < 0.3
     glass = ax.add_patch(Circle((place[0], place[1]), 0.3, ec="black", zorder=5))
     ax.text(place[0], place[1] - 0.9, "glass", ha="center")
@@ -251,11 +248,7 @@ def camera_that_loses_its_target() -> Animation:
     motions = [rb.matrix_from_zyx(angles)[::10], wanted[::10]]
     off = np.degrees(rb.angle_between(*motions))
     alt = f"A camera loses its target, which passes overhead: it is up to {off.max():.0f}° off."
-    look: dict[str, Any] = {
-        "still": int(off.argmax()),
-        "seconds": 4.0,
-        "target": motions[1][:, :, 0],
-    }
+    look: Any = {"still": int(off.argmax()), "seconds": 4.0, "target": motions[1][:, :, 0]}
     return _compare(_turning, 3, alt, motions, _said("off by {:.0f}°", off, 0 * off), **look)
 
 
@@ -325,9 +318,8 @@ def wrench_that_leaves_its_bolt() -> Animation:
 
 def _wrench(ax: Any, nuts: Array) -> Update:
     """Draw a bolt, a nut with a handle that moves, and the trail of the hand."""
-    bolt = bodies.draw_box(
-        ax, rb.pose_from_components(_I, [0, 0, 0.06]), np.array([0.04, 0.04, 0.06])
-    )
+    foot = rb.pose_from_components(_I, [0, 0, 0.06])
+    bolt = bodies.draw_box(ax, foot, np.array([0.04, 0.04, 0.06]))
     bolt.set(colours=["0.5"] * 7)
     nut, edges = bodies.draw_box(ax, nuts[0], 0.1), np.array([0.1, 0.1, 0.05])
     (handle,) = ax.plot([], [], [], color=COLOURS["z"], lw=7)
@@ -403,13 +395,9 @@ def cube_that_comes_from_another_side() -> Animation:
     motions = [rb.minimum_acceleration(A0, A1, S0, S)(T) for S in (wrong, S1)]
     off = np.linalg.norm((motions[0] - motions[1])[:, :3, 3], axis=1)
     alt = f"A cube comes from another side than was meant, and is up to {off.max():.1f} m off."
-    look: dict[str, Any] = {
-        "edges": 3 * np.ones(3),
-        "view": (20, -22),
-        "zoom": 1.3,
-        "still": int(off.argmax()),
-    }
-    return _compare(_flying, 10, alt, motions, _said("off by {:.1f} m", off, 0 * off), **look)
+    notes = _said("off by {:.1f} m", off, 0 * off)
+    look: Any = {"edges": 3 * np.ones(3), "view": (20, -22), "zoom": 1.3}
+    return _compare(_flying, 10, alt, motions, notes, still=int(off.argmax()), **look)
 
 
 def turn_that_goes_back() -> Animation:
@@ -438,10 +426,8 @@ def book_taken_for_a_ball() -> Animation:
     curves = rb.minimum_acceleration(*ends), rb.minimum_torque(*ends, body=book)
     ratio = np.divide(*(rb.torque_cost(curve, body=book) for curve in curves))
     torque = [np.linalg.norm(lesson13.torques(c, book.inertia, T), axis=1) for c in curves]
-    more, titles = (
-        f"costs {100 * ratio - 100:.0f} % more torque",
-        ("as if it were a ball", "as a book"),
-    )
+    titles = "as if it were a ball", "as a book"
+    more = f"costs {100 * ratio - 100:.0f} % more torque"
     alt = f"A book that is turned as if it were a ball {more} than at best."
     with _panels("space", "space", foot=0.22) as (fig, axes):
         moves = [_turning(ax, c(T), edges=4 * edges) for ax, c in zip(axes, curves, strict=True)]
@@ -489,12 +475,7 @@ def tool_at_one_rate() -> Animation:
     """Lesson 15: a tool is slow everywhere; the number is its time over that of the fastest."""
     stops = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0]]
     poses = rb.pose_from_components(rb.exp_so3(np.outer([0, 0, 2, 2, 2], _I[2])), stops)
-    limits: dict[str, Any] = {
-        "angular_speed": 2,
-        "speed": 3,
-        "angular_acceleration": 4.8,
-        "acceleration": 8,
-    }
+    limits: Any = {"angular_speed": 2, "speed": 3, "angular_acceleration": 4.8, "acceleration": 8}
     path = rb.projected_spline(np.arange(5.0), poses)
     used, fastest = rb.limits_used(path, **limits), rb.fastest(path, **limits)
     even = 4 * max(x if name.endswith("speed") else x**0.5 for name, (x, _) in used.items())
@@ -502,14 +483,9 @@ def tool_at_one_rate() -> Animation:
     ratio = f"{even / fastest.domain[1]:.1f} times as long"
     alt = f"A tool that moves at one rate takes {ratio} as with the fastest timing."
     notes, titles = _said("{:.1f} s", slow, fast), (f"one rate: {ratio}", "the fastest timing")
-    look: dict[str, Any] = {
-        "edges": np.array([0.5, 0.3, 0.15]),
-        "view": (30, -70),
-        "zoom": 1.35,
-        "seconds": even,
-    }
+    look: Any = {"edges": np.array([0.5, 0.3, 0.15]), "view": (30, -70), "zoom": 1.35}
     motions, still = [path(4 * T), fastest(fast)], int((slow > fast).argmax())
-    return _compare(_flying, 15, alt, motions, notes, titles, still, **look)
+    return _compare(_flying, 15, alt, motions, notes, titles, still, even, **look)
 
 
 def gripper_that_shakes() -> Animation:

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline, make_smoothing_spline
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation, RotationSpline
@@ -32,6 +31,7 @@ Smooth = Callable[..., Array]
 TABLE = Path(__file__).with_name("rivals.csv")
 POSES, FINE, SUBSTEPS = 120, 8, 32
 """The number of poses; each step is divided for the errors, and again for the integration."""
+TIMES = np.linspace(0, POSES - 1, FINE * (POSES - 1) + 1)
 STEPS, NOISES = (1, 5, 20, 60), (0.2, 1, 3, 10)
 """Mean turns from pose to pose, and root mean squares of the noise, in degrees."""
 ERRORS = "R [1]", "w [1]", "a [1]"
@@ -62,28 +62,19 @@ def wander(rng: np.random.Generator, step: float) -> Motion:
 
 def tumble(rng: np.random.Generator, step: float) -> Motion:
     """Return the free motion of a book."""
-    G, start = np.array([1, 2.22, 3.18]), rng.normal(size=3) * [1, 2, 1]
+    G, start = np.diag([1, 2.22, 3.18]), rng.normal(size=3) * [1, 2, 1]
     start /= np.linalg.norm(start)
-
-    def rate(_: float, w: Array) -> Array:
-        return np.cross(G * w, w) / G
-
-    last = step * (POSES - 1)
-    w = solve_ivp(rate, (0, 2 * last), start, rtol=1e-11, atol=1e-13, dense_output=True).sol
+    flow = partial(rb.connection.geodesic_flow, G, np.eye(3))
     # w(t) of a free motion gives another one, speed * w(speed * t)
-    speed = step / np.linalg.norm(w(np.linspace(0, last, 2000)), axis=0).mean()
-
-    def rates(t: Array, order: int) -> Array:
-        found: Array = w(speed * t).T
-        return speed * found if order == 0 else speed**2 * rate(0, found)
-
-    return _integrated(rates)
+    _, w = flow(start, np.linspace(0, step * (POSES - 1), 2000))
+    speed = step / np.linalg.norm(w, axis=1).mean()
+    R, w = flow(speed * start, TIMES)
+    return Motion(TIMES, R, w, np.cross(w @ G, w) / np.diag(G))
 
 
 def reach(rng: np.random.Generator, step: float) -> Motion:
     """Return turns of least jerk about random axes, each in 18 steps, with rests of 6 steps."""
-    t = np.linspace(0, POSES - 1, FINE * (POSES - 1) + 1)
-    count = POSES // 24
+    t, count = TIMES, POSES // 24
     axes = rng.normal(size=(count, 3))
     turns = axes / np.linalg.norm(axes, axis=1)[:, None] * rng.uniform(0.6, 1.4, (count, 1))
     turns *= 18 * step
@@ -111,8 +102,7 @@ def _integrated(rates: Callable[[Array, int], Array]) -> Motion:
     R[0] = np.eye(3)
     for i, turn in enumerate(turns):
         R[i + 1] = R[i] @ turn
-    t = np.linspace(0, POSES - 1, FINE * (POSES - 1) + 1)
-    return Motion(t, R[:: SUBSTEPS // FINE], rates(t, 0), rates(t, 1))
+    return Motion(TIMES, R[:: SUBSTEPS // FINE], rates(TIMES, 0), rates(TIMES, 1))
 
 
 def interpolated(t: Array, R: Array) -> Smooth:

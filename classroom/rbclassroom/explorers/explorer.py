@@ -11,7 +11,6 @@ from typing import Any
 
 import anywidget
 import ipywidgets
-import matplotlib.pyplot as plt
 import numpy as np
 import traitlets
 from matplotlib.figure import Figure
@@ -20,9 +19,9 @@ from numpy.typing import NDArray
 from rbcourse import angle_between
 from rbcourse.draw.bodies import set_turning
 from rbcourse.draw.display import ENGINE, Display, joined
+from rbcourse.draw.drawing import style
 from rbcourse.draw.pictures import data_url, drawn
 
-_STYLES = ["default", "rbcourse.rbcourse"]
 # the labels of sliders are above them, so that a slider has the width of the panel
 _PANEL = """.rbcourse-panel .widget-slider { flex-wrap: wrap; height: auto; }
 .rbcourse-panel .widget-slider > .widget-label {
@@ -170,7 +169,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
 
         If `shown` is None, scenes in space are omitted, because the reader can turn them.
         """
-        with plt.style.context(_STYLES):
+        with style():
             return drawn(self._fig, list(self.artists.values()), shown, zoom)
 
     def _follow(self, _: Any = None, notice: str = "") -> None:
@@ -223,7 +222,7 @@ class Explorer(ipywidgets.Box):  # type: ignore[misc]
 @contextmanager
 def new_figure() -> Iterator[Figure]:
     """Yield a figure for an explorer; drawings on it have the style of the course."""
-    with plt.style.context(_STYLES):
+    with style():
         fig = Figure(figsize=(5.6, 3.8), dpi=100)
         fig.set_layout_engine("none")
         yield fig
