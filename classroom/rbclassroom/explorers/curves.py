@@ -28,9 +28,8 @@ def theta_explorer() -> Explorer:
     """Return an explorer of the line between two rotations, and of its projection θ(t).
 
     The left picture shows the circle of the rotations between the two ends, with the chord; the
-    right picture shows θ against time. The controls are the ``angle`` a in degrees, and the time
-    ``t``, which the play button moves, or a click on the left picture (BK Prop. 6, BK (15), BK
-    (16), BK Cor. 1, BK Fig. 2).
+    right picture shows θ against time. A click on the left picture sets the time (BK Prop. 6,
+    BK (15), BK (16), BK Cor. 1, BK Fig. 2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.0, 0.1, 0.58, 0.82))
@@ -92,9 +91,7 @@ def theta_explorer() -> Explorer:
 def screw_explorer() -> Explorer:
     """Return an explorer of two motions from the fixed frame to a pose: geodesic and screw.
 
-    The controls are the ``angle`` of the turn, the ``tilt`` of its axis from z towards x, both in
-    degrees, the position ``x`` and ``z`` of the goal in m, and the time ``t``, which the play
-    button moves (BK 2.6, BK (10), BK (14)).
+    Source: BK 2.6, BK (10), BK (14).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.27, -0.27, 1.51, 1.51), 2.5)
@@ -152,9 +149,8 @@ def flip_explorer() -> Explorer:
     """Return an explorer of a book that spins freely, nearly about one of its axes.
 
     The three axes stick out of the book on both sides, and one end of each axis has a number. The
-    angular momentum is vertical and constant. The controls are the ``axis`` of the spin, the angle
-    ``off`` between the spin and this axis in degrees, and the time ``t`` in s, which the play
-    button moves. The time starts again when another axis is chosen (BK (8), BK 2.4).
+    angular momentum is vertical and constant. The time starts again when another axis is chosen
+    (BK (8), BK 2.4).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.05, 0.0, 0.58, 1.0), 0.155)

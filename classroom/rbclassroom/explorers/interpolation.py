@@ -52,9 +52,7 @@ def interpolation_explorer() -> Explorer:
 
     The ways blend the ZYX angles, the entries of the matrices, the quaternions (on the short arc),
     and the rotation vectors. Each picture shows a box, its nose on the body's x axis, and the path
-    of the nose from a circle to a dot. The controls are the ZYX angles of the start, ``yaw0 pitch0
-    roll0``, and of the goal, ``yaw1 pitch1 roll1``, in degrees, and the time ``t``, which the play
-    button moves (RR 2.1, RR 2.2, BK 2.5).
+    of the nose from a circle to a dot (RR 2.1, RR 2.2, BK 2.5).
     """
     artists: dict[str, Any] = {}
     with new_figure() as fig:
@@ -110,10 +108,8 @@ def double_cover_explorer() -> Explorer:
 
     The plate turns about the vertical z axis and twists the belt. The orange half of the belt and
     the orange line on the plate are on the side of the body's x axis. The right picture shows w and
-    z of the quaternions along the belt, from 1 at the ceiling to q at the plate. The controls are
-    the ``turn`` of the plate in degrees, which the play button moves, and ``untwist``, from 0 to 1,
-    which straightens the belt while the plate does not move. This is possible only after 720° (BK
-    2.5, RR 2.2).
+    z of the quaternions along the belt, from 1 at the ceiling to q at the plate. After 720° only,
+    the belt can be straightened while the plate does not move (BK 2.5, RR 2.2).
     """
     with new_figure() as fig:
         ax: Any = fig.add_axes((-0.19, -0.3, 1.0, 1.4), projection="space")

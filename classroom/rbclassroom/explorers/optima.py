@@ -39,10 +39,8 @@ def minimum_acceleration_explorer() -> Explorer:
     """Return an explorer of the paper's example: the optimum and a closed form, and their costs.
 
     Both curves run from I to exp(s σ), with ω(0) = s σ, ω(1) = s σ + k e₁, and the σ of BK (21).
-    `acceleration_cost` computes the costs. The box follows the optimum, and its pink outline
-    follows the closed form. The controls are the ``rival`` (the closed form), the ``size`` s, the
-    time ``t``, and ``k`` in rad per unit time, which the play button moves (BK 1, BK (18), BK (19),
-    BK (21), BK 6.2, BK Fig. 4).
+    The box follows the optimum, and its pink outline follows the closed form (BK 1, BK (18),
+    BK (19), BK (21), BK 6.2, BK Fig. 4).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.12, 0.18, 0.46, 0.78))
@@ -90,10 +88,7 @@ def cube_explorer() -> Explorer:
 
     A black outline shows the optimum around the projection, too, and texts show the costs of the
     rotations until the time t, in rad². The boundary conditions are those of the paper, but three
-    of them can be changed. The goal has a pale colour. The controls are the ``turn``, as a fraction
-    of the paper's; ``spin``, the last component of ω(1) in rad per unit time; ``rise``, the last
-    component of the final velocity in m per unit time; and the time ``t``, which the play button
-    moves (BK 6.3, BK (14), BK Fig. 5).
+    of them can be changed. The goal has a pale colour (BK 6.3, BK (14), BK Fig. 5).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -140,9 +135,7 @@ def body_explorer() -> Explorer:
     """Return an explorer of a book of 1 kg that is turned from rest to rest in 1 s.
 
     It shows three motions: the optimum for a ball, the motion of least acceleration, and the motion
-    of least torque. The controls are ``about`` (the axis of the displacement), the ``turn`` in
-    degrees, the ``thickness`` of the book in cm, and the time ``t``, which the play button moves
-    (beyond BK 3, beyond BK 4).
+    of least torque (beyond BK 3, beyond BK 4).
     """
     artists: dict[str, Any] = {}
     with new_figure() as fig:

@@ -48,9 +48,7 @@ def spline_explorer() -> Explorer:
     Both curves are projected cubics. The left curve has the velocities of parabolas, the right
     curve those of the spline. On each sphere of directions, a line is the path of the first body
     axis, a short stroke shows the third axis, and dots are the given orientations. Below each
-    sphere, a line shows ‖ω′‖ up to the present time. The controls are the ``ends`` ("natural" or
-    "at rest"), the ``pitch`` of the third orientation in degrees, its time ``third`` in s, and the
-    time ``t`` in s, which the play button moves (beyond BK 12, beyond BK 13).
+    sphere, a line shows ‖ω′‖ up to the present time (beyond BK 12, beyond BK 13).
     """
     with new_figure() as fig:
         artists: dict[str, Any] = {}
@@ -128,11 +126,9 @@ def _two_splines(ends: str, pitch: float, third: float) -> tuple[Any, ...]:
 def chain_explorer() -> Explorer:
     """Return an explorer of a box that moves through four poses.
 
-    The controls are the ``curve``, the ``duration`` of the motion in s, and the time ``t`` as a
-    fraction of the duration, which the play button moves. There are four curves: geodesics,
-    projected cubics with the velocities of parabolas, projected cubics with the velocities of the
-    spline, and the optimum. All except the geodesics are at rest at both ends (BK 6.3, beyond BK
-    14).
+    There are four curves: geodesics, projected cubics with the velocities of parabolas, projected
+    cubics with the velocities of the spline, and the optimum. All except the geodesics are at rest
+    at both ends (BK 6.3, beyond BK 14).
     """
     with new_figure() as fig:
         space = new_space(fig, (-0.06, -0.1, 0.74, 1.2), 2.15)
@@ -213,9 +209,7 @@ def timing_explorer() -> Explorer:
 
     The right picture is the phase plane: the rate of the path parameter s against s, with a pose at
     each integer s. No timing may lie above the limit curves. The grey line is the timing at a
-    constant rate. The box moves with the fastest timing. The controls are the largest allowed
-    ``angular_speed`` of the box, the largest ``speed`` and ``acceleration`` of its centre, and
-    ``t``, the time as a fraction of the duration, which the play button moves (beyond BK 16).
+    constant rate. The box moves with the fastest timing (beyond BK 16).
     """
     path = rb.projected_spline(np.arange(4.0), POSES)
     with new_figure() as fig:

@@ -32,9 +32,7 @@ _BESIDE = np.array([0.5, 0.3])
 def planar_explorer() -> Explorer:
     """Return an explorer of a plan, with velocities in the world frame or in the body frame.
 
-    The plan has two commands of two seconds each. The controls are their velocities in m/s and
-    degrees/s, ``vx1 vy1 omega1`` and ``vx2 vy2 omega2``, and the time ``t`` in s, which the play
-    button moves (RR 3.2, RR (17), RR (18), RR (19)).
+    The plan has two commands of two seconds each (RR 3.2, RR (17), RR (18), RR (19)).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.11, 0.18, 0.88, 0.79))
@@ -79,9 +77,8 @@ def planar_explorer() -> Explorer:
 def arm_explorer() -> Explorer:
     """Return an explorer of the two-link arm: set its angles, or click on a goal for its hand.
 
-    A pale arm shows the start, from which both motors run at constant speeds. The controls are the
-    goal ``theta0`` and ``theta1``, in degrees, and the time ``t`` in [0, 1], which the play button
-    moves. If you set a goal, the arm is shown at the goal (RR 4, RR 4.1, RR (20), RR (21)).
+    A pale arm shows the start, from which both motors run at constant speeds. If you set a goal,
+    the arm is shown at the goal (RR 4, RR 4.1, RR (20), RR (21)).
     """
     with new_figure() as fig:
         ax = fig.add_axes((0.15, 0.18, 0.7, 0.77))

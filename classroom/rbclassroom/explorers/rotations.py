@@ -36,8 +36,7 @@ def rotation_explorer() -> Explorer:
 
     The picture shows a box with its axes. Dashed lines are the axes of the three turns: the fixed z
     axis, the y axis after the first turn, and the body's own x axis. A dotted line is the axis of
-    the single turn that replaces them. The controls are ``alpha beta gamma``, the ZYX angles in
-    degrees; the play button moves ``beta`` (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
+    the single turn that replaces them (RR 2.1, RR (7), RR (8), RR 2.2, BK 2.5).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.15, -0.08, 1.28, 1.15), 1.3)
@@ -103,8 +102,7 @@ def projection_explorer() -> Explorer:
     """Return an explorer of a matrix that is not a rotation, and of two methods to repair it.
 
     Grey lines are the columns of I + pull · E, full lines those of the nearest rotation, and dashed
-    lines those of Gram–Schmidt. The controls are the entries ``e12``, ``e23`` and ``e33`` of E, and
-    the factor ``pull``, which the play button moves (BK 4, BK Prop. 2, RR 1.4).
+    lines those of Gram–Schmidt (BK 4, BK Prop. 2, RR 1.4).
     """
     with new_figure() as fig:
         ax = new_space(fig, (-0.4, -0.52, 1.71, 1.71), 2.2)
@@ -156,9 +154,8 @@ def _gram_schmidt(M: rb.Array) -> tuple[rb.Array, str]:
 def random_explorer() -> Explorer:
     """Return an explorer of random rotations: the images of e₁, and tests of uniformity.
 
-    The controls are the ``sampler``, "three angles" or "uniform", the ``number`` of rotations,
-    which the play button moves, and the ``seed``. Each seed has a fixed sequence of 2000 rotations,
-    and its first ``number`` rotations are shown (RR 2, RR 2.1, RR 2.2).
+    Each seed has a fixed sequence of 2000 rotations, of which the first ones are shown (RR 2,
+    RR 2.1, RR 2.2).
     """
     with new_figure() as fig:
         ax = fig.add_axes((-0.01, -0.03, 0.56, 1.0), projection="space")

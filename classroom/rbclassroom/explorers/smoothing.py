@@ -45,9 +45,8 @@ def smoothing_explorer() -> Explorer:
     On the sphere of directions, dots are the measured first axes of the body, and a line is the
     path of this axis along the smoothed curve. The upper right picture has the angular speeds of
     the true motion and of the curve. Below, a dot on the line of cross validation is the error of
-    the prediction of an omitted pose, and a circle is the distance from the true motion. The
-    controls are the ``noise`` in degrees (RMS), and the ``period`` of the smoothing in s, which the
-    play button moves (beyond BK 17).
+    the prediction of an omitted pose, and a circle is the distance from the true motion
+    (beyond BK 17).
     """
     truth = hand()
     with new_figure() as fig:
