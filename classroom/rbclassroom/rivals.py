@@ -227,13 +227,12 @@ def errors_of_all(step: float, noise: float, kind: str, seed: int) -> dict[str, 
     return {name: errors(curve, motion) / rms for name, curve in made.items()}
 
 
-def table(seeds: int) -> dict[str, list[Any]]:
+def table(seeds: int) -> dict[str, tuple[Any, ...]]:
     """Return for each step, noise and method the geometric mean of the three medians."""
-    columns: dict[str, list[Any]] = {"step [rad]": [], "noise [rad]": [], "method": []}
-    columns |= {name: [] for name in ERRORS}
     from concurrent.futures import ProcessPoolExecutor  # not available in web browsers
     from multiprocessing import get_context
 
+    rows = []
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         for step, noise in product(STEPS, NOISES):
             medians = []
@@ -243,11 +242,10 @@ def table(seeds: int) -> dict[str, list[Any]]:
                 medians.append({name: np.median(x, axis=0) for name, x in each.items()})
             for name in medians[0]:
                 mean = np.exp(np.mean([np.log(x[name]) for x in medians], axis=0))
-                row = [np.radians(step), np.radians(noise), name, *mean]
-                for column, value in zip(columns.values(), row, strict=True):
-                    column.append(value)
+                rows.append([np.radians(step), np.radians(noise), name, *rounded(mean, 6)])
             print(f"{step}° a step, noise {noise}°", flush=True)
-    return columns
+    names = "step [rad]", "noise [rad]", "method", *ERRORS
+    return dict(zip(names, zip(*rows, strict=True), strict=True))
 
 
 def stored() -> dict[tuple[float, float], dict[str, Array]]:
@@ -263,7 +261,6 @@ def stored() -> dict[tuple[float, float], dict[str, Array]]:
 def main() -> None:
     """Compute the table and write it; an argument is the number of motions of each kind."""
     columns = table(int(sys.argv[1]) if len(sys.argv) > 1 else 30)
-    columns |= {name: rounded(np.array(columns[name]), 6).tolist() for name in ERRORS}
     replace_file(TABLE, csv_text(columns).encode())
 
 
