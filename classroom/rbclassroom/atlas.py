@@ -167,8 +167,7 @@ def survey(
 
             # new processes share nothing with a notebook's threads; they ignore Ctrl-C
             new, ignored = get_context("spawn"), (signal.SIGINT, signal.SIG_IGN)
-            executor = ProcessPoolExecutor(None, new, signal.signal, ignored)
-            stack.enter_context(executor)
+            executor = stack.enter_context(ProcessPoolExecutor(None, new, signal.signal, ignored))
         stack.enter_context(threadpool_limits(1))  # all threads keep this limit until the end
         for part in (executor.map if executor else map)(work, chunks):
             parts.append(part)
@@ -292,14 +291,12 @@ def stored(table: str) -> Columns:
     return {name: np.array(x, float if name.endswith("]") else str) for name, x in columns}
 
 
-def write_tables(
-    draws: int = 200, seeds: Sequence[int] = (31, 32, 33), executor: Executor | None = None
-) -> None:
+def write_tables(draws: int = 200, seeds: Sequence[int] = (31, 32, 33)) -> None:
     """Compute both tables of lesson 13, with `draws` problems in each cell for each seed."""
     tables: dict[str, list[Columns]] = {"maps": [], "intervals": []}
     for seed, (name, body) in product(seeds, BODIES.items()):
         problems = atlas_problems(draws, ["any"], rng=seed)
-        excess = body_excesses(problems, body, executor, f"{name}, seed {seed}")
+        excess = body_excesses(problems, body, None, f"{name}, seed {seed}")
         cells = cell_table(excess, draws, {"median": 0.5, "90 %": 0.9}, [name])
         known = intervals(excess, draws)
         named = {"seed [1]": seed, "body": name}
