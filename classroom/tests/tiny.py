@@ -14,9 +14,9 @@ from nbformat.v4 import new_notebook
 
 MODULE = [sys.executable, "-m"]
 SERVE = """
-import pathlib, signal, sys, webbrowser
+import pathlib, signal, sys, time, webbrowser
 from rbclassroom.book.serve import serve
-webbrowser.open = print
+webbrowser.open = lambda address: time.sleep(120)  # some calls return when the browser is closed
 signal.signal(signal.SIGINT, signal.default_int_handler)
 serve(pathlib.Path(sys.argv[1]))
 """

@@ -1,6 +1,7 @@
 """Show the finished book in a browser, from a server on this machine."""
 
 import os
+import threading
 import webbrowser
 from contextlib import suppress
 from functools import partial
@@ -49,6 +50,7 @@ def serve(book: Path) -> None:
         raise ValueError(f"The book is made, but {why}. {keep}. {there}.") from error
     with server:
         print(f"The book is at {address}. Press Ctrl-C here to stop its server.", flush=True)
-        webbrowser.open(address)
+        # with some browsers, this call returns only when they are closed
+        threading.Thread(target=webbrowser.open, args=[address], daemon=True).start()
         with suppress(KeyboardInterrupt):
             server.serve_forever()

@@ -21,4 +21,22 @@ from rbclassroom.explorers.plane import arm_explorer, planar_explorer
 from rbclassroom.explorers.rotations import projection_explorer, random_explorer, rotation_explorer
 from rbclassroom.explorers.smoothing import smoothing_explorer
 
-__all__ = [name for name in dir() if name.endswith("_explorer")]
+__all__ = [
+    "arm_explorer",
+    "body_explorer",
+    "chain_explorer",
+    "cube_explorer",
+    "double_cover_explorer",
+    "flip_explorer",
+    "interpolation_explorer",
+    "minimum_acceleration_explorer",
+    "planar_explorer",
+    "projection_explorer",
+    "random_explorer",
+    "rotation_explorer",
+    "screw_explorer",
+    "smoothing_explorer",
+    "spline_explorer",
+    "theta_explorer",
+    "timing_explorer",
+]
