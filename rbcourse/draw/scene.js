@@ -40,25 +40,21 @@ const rbcourseScene = {
     }
     const low = Math.min(0, ...sides), high = Math.max(0, ...sides);
     if (!low || !high) return put(low + high, piece);
-    const parts = { "-1": [[]], 1: [[]] };
-    places.forEach((p, i) => {
-      for (const t of [-1, 1]) {
-        if (sides[i] === t || !sides[i]) parts[t].at(-1).push(p);
-        else if (kind === "line" && parts[t].at(-1).length) parts[t].push([]); // the line leaves this side at a point in the plane
-      }
-      const j = (i + 1) % places.length;
-      if (sides[i] * sides[j] >= 0 || (kind === "line" && !j)) return;
-      const share = heights[i] / (heights[i] - heights[j]);
-      const q = p.map((x, k) => x + share * (places[j][k] - x));
-      const below = (sides[i] < 0 ? p : places[j]).map((x, k) => x - q[k]);
-      const more = Math.min(1, overlap / Math.hypot(...below.slice(0, 3)));
-      const ends = { "-1": q, 1: q.map((x, k) => x + more * below[k]) };
-      parts[sides[i]].at(-1).push(ends[sides[i]]);
-      if (kind === "line") parts[sides[i]].push([]);
-      parts[sides[j]].at(-1).push(ends[sides[j]]);
-    });
-    const least = kind === "line" ? 2 : 3;
-    for (const t of [-1, 1]) for (const run of parts[t]) if (run.length >= least) put(t, { ...piece, places: run });
+    for (const t of [-1, 1]) {
+      const runs = [[]];
+      places.forEach((p, i) => {
+        if (t * sides[i] >= 0) runs.at(-1).push(p);
+        else if (kind === "line") runs.push([]); // a line may come back to this side
+        const j = (i + 1) % places.length;
+        if (sides[i] * sides[j] >= 0 || (kind === "line" && !j)) return;
+        const share = heights[i] / (heights[i] - heights[j]);
+        const q = p.map((x, k) => x + share * (places[j][k] - x));
+        const below = (sides[i] < 0 ? p : places[j]).map((x, k) => x - q[k]);
+        const more = t > 0 ? Math.min(1, overlap / Math.hypot(...below.slice(0, 3))) : 0;
+        runs.at(-1).push(q.map((x, k) => x + more * below[k]));
+      });
+      for (const run of runs) if (run.length >= (kind === "line" ? 2 : 3)) put(t, { ...piece, places: run });
+    }
   },
 
   // Return the face whose plane cuts the fewest faces and lines.
@@ -78,27 +74,21 @@ const rbcourseScene = {
   // Return pieces from the farthest to the nearest, cut where they pass through faces: first the pieces behind the
   // plane of a face, then faces in it, then pieces over them or on the side of the eye. Each side is ordered likewise.
   order(pieces, eye) {
-    const { dot, cut, pixels, wall: first } = rbcourseScene, drawn = [], todo = [[false, pieces]];
-    const mean = ({ places }) => pixels(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length);
-    while (todo.length) {
-      const [ready, group] = todo.pop();
-      const wall = first(group, eye);
-      if (ready) drawn.push(...group);
-      else if (!wall) {
-        const known = group.map((piece) => [piece.zorder, mean(piece), piece]);
-        known.sort((a, b) => a[0] - b[0] || a[1] - b[1]).forEach(([, , piece]) => drawn.push(piece));
-      } else {
-        const ahead = wall.normal ?? eye, n = dot(ahead, eye) < 0 ? ahead.map((x) => -x) : ahead;
-        const level = dot(wall.places[0], n), sides = { "-1": [], 0: [wall], 1: [] };
-        for (const piece of group) {
-          if (piece !== wall) cut(piece, (p) => dot(p, n) - level, (side, part) => sides[side].push(part));
-        }
-        sides[0].sort((a, b) => a.zorder - b.zorder);
-        const over = sides[0].splice(sides[0].findLastIndex(({ kind }) => kind === "face" || kind === "ball") + 1);
-        todo.push([false, [...over, ...sides[1]]], [true, sides[0]], [false, sides[-1]]);
-      }
+    const { dot, cut, pixels, order } = rbcourseScene, wall = rbcourseScene.wall(pieces, eye);
+    if (!wall) {
+      const mean = ({ places }) => pixels(places.reduce((sum, p) => sum + dot(p, eye), 0) / places.length);
+      const known = pieces.map((piece) => ({ piece, depth: mean(piece) }));
+      known.sort((a, b) => a.piece.zorder - b.piece.zorder || a.depth - b.depth);
+      return known.map(({ piece }) => piece);
     }
-    return drawn;
+    const ahead = wall.normal ?? eye, n = dot(ahead, eye) < 0 ? ahead.map((x) => -x) : ahead;
+    const level = dot(wall.places[0], n), sides = { "-1": [], 0: [wall], 1: [] };
+    for (const piece of pieces) {
+      if (piece !== wall) cut(piece, (p) => dot(p, n) - level, (side, part) => sides[side].push(part));
+    }
+    sides[0].sort((a, b) => a.zorder - b.zorder);
+    const over = sides[0].splice(sides[0].findLastIndex(({ kind }) => kind === "face" || kind === "ball") + 1);
+    return [...order(sides[-1], eye), ...sides[0], ...order([...over, ...sides[1]], eye)];
   },
 
   // Return the drawings on the screen: styles, positions [x, y], and the distance along the line at the first one.
@@ -137,8 +127,8 @@ const rbcourseScene = {
   // Let a pointer, keys and buttons turn the view of a canvas; return the buttons. All scenes turn together.
   turn(canvas, rooms, redraw) {
     const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
-    const row = make("div", { className: "rbcourse-view" }), said = make("output", { ariaLive: "off" });
-    row.style = "display: flex; flex-wrap: wrap; gap: 0.3em; align-items: center";
+    const style = "display: flex; flex-wrap: wrap; gap: 0.3em; align-items: center";
+    const row = make("div", { className: "rbcourse-view", style }), said = make("output", { ariaLive: "off" });
     const set = (views) => {
       canvas.views = views.map(([a, e]) => [((a + 540) % 360) - 180, Math.max(-90, Math.min(90, e))]);
       const [a, e] = canvas.views[0].map((x) => `${Math.round(x)}°`.replace("-", "−"));
@@ -148,11 +138,7 @@ const rbcourseScene = {
     const to = (views) => { set(views); redraw(); };
     const by = (right, up) => to(canvas.views.map(([a, e]) => [a - right, e + up]));
     const first = rooms.map(({ view }) => view), all = (view) => rooms.map(() => view);
-    const save = () => canvas.toBlob((blob) => {
-      const link = make("a", { href: URL.createObjectURL(blob), download: "picture.png" });
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    });
+    const save = () => make("a", { href: canvas.toDataURL(), download: "picture.png" }).click();
     for (const [name, onclick] of [
       ["front", () => to(all([-90, 0]))], ["side", () => to(all([0, 0]))], ["top", () => to(all([-90, 90]))],
       ["↑", () => by(0, 15)], ["↓", () => by(0, -15)], ["first view", () => to(first)], ["save picture", save],
@@ -167,19 +153,14 @@ const rbcourseScene = {
       event.preventDefault();
       event.stopPropagation(); // JupyterLab and lectures also use these keys
     });
-    let from = null; // the last position of the first finger
-    canvas.addEventListener("pointerdown", ({ pointerId, clientX, clientY }) => {
-      from ??= { pointerId, clientX, clientY };
-      canvas.setPointerCapture(pointerId);
-    });
-    canvas.addEventListener("pointermove", ({ pointerId, clientX, clientY }) => {
-      if (from?.pointerId !== pointerId) return;
-      by((clientX - from.clientX) / 2, (clientY - from.clientY) / 2); // half a degree for a pixel
-      from = { pointerId, clientX, clientY };
-    });
-    for (const end of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(end, ({ pointerId }) => { if (from?.pointerId === pointerId) from = null; });
-    }
+    let last; // the last position of the first finger
+    const drag = ({ type, isPrimary, pointerId, clientX, clientY }) => {
+      if (type === "pointerdown") canvas.setPointerCapture(pointerId);
+      if (!isPrimary || !canvas.hasPointerCapture(pointerId)) return;
+      if (type === "pointermove") by((clientX - last[0]) / 2, (clientY - last[1]) / 2); // half a degree for a pixel
+      last = [clientX, clientY];
+    };
+    for (const type of ["pointerdown", "pointermove"]) canvas.addEventListener(type, drag);
     canvas.tabIndex = 0;
     Object.assign(canvas.style, { cursor: "grab", touchAction: "pan-y pinch-zoom" });
     canvas.title = "Drag, or press the arrow keys, to turn; Home: first view";
