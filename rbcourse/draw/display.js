@@ -35,7 +35,7 @@ const rbcourseDisplay = {
 
   // Draw a state, or its drawings, at the resolution of the screen; `still` is a loaded image. Scenes are drawn first.
   draw(canvas, still, { size: [width, height], rooms }, styles, state) {
-    const zoom = (window.devicePixelRatio * (canvas.clientWidth || width)) / width;
+    const zoom = (devicePixelRatio * (canvas.getBoundingClientRect().width || width)) / width; // slides are scaled
     canvas.width = Math.round(width * zoom);
     canvas.height = Math.round(height * zoom);
     const ink = canvas.getContext("2d");
@@ -74,6 +74,7 @@ const rbcourseDisplay = {
       }
       ink.restore();
     }
+    canvas.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
   },
 
   // Return the texts of a state, [[name, text], ...], and its notice, as HTML.
@@ -109,7 +110,7 @@ const rbcourseDisplay = {
   // state(values) returns new drawings and texts; moved(values, k) returns the values after a move of control k, and point(place, values) those
   // after a click at a place, in pixels, or null.
   async revive(image, { size, rooms, background, states, known, controls, milliseconds, computed, parts }) {
-    if (image.dataset.read || !window.DecompressionStream) return;
+    if (image.dataset.read) return;
     image.dataset.read = true;
     const back = Object.assign(new Image(), { src: background });
     await back.decode();
@@ -141,9 +142,13 @@ const rbcourseDisplay = {
     const player = rows.find(({ plays }) => plays) ?? rows.at(-1), last = player?.slider;
     const button = make("button", { textContent: "▶", ariaLabel: "play or pause" });
     last?.parentNode?.prepend(button);
+    const set = (row, k) => {
+      row.slider.value = k; // not above its largest value
+      row.now = row.exact[row.slider.value];
+    };
     const start = () => {
       pause();
-      for (const row of rows) [row.slider.value, row.now] = [row.first, row.exact[row.first]];
+      rows.forEach((row) => set(row, row.first));
       show();
     };
     panel.append(table, ...(rows.length ? [make("button", { className: "rbcourse-reset", textContent: "Reset", onclick: start })] : []));
@@ -166,16 +171,14 @@ const rbcourseDisplay = {
     button.onclick = () => {
       if (timer) return pause();
       timer = setInterval(() => {
-        last.value = last.value === last.max ? 0 : +last.value + step;
-        player.now = player.exact[last.value];
+        set(player, last.value === last.max ? 0 : +last.value + step);
         show();
       }, step * milliseconds);
       button.textContent = "❚❚";
     };
     const move = (k, to = rows[k].slider.value) => {
       pause();
-      rows[k].slider.value = to;
-      rows[k].now = rows[k].exact[to];
+      set(rows[k], to);
       if (explorer?.moved) put(explorer.moved(rows.map(({ now }) => now), k));
       show();
     };

@@ -4,11 +4,8 @@ export default {
     const made = model.get("made"), { size, rooms, background, first, clickable, parts } = made;
     const [time, play, said, ...others] = await Promise.all(parts.map((id) => model.widget_manager.get_model(id)));
     const count = time.get("_options_labels").length;
-    const canvas = document.createElement("canvas"), back = new Image();
+    const canvas = document.createElement("canvas"), back = await createImageBitmap(new Blob([background]));
     canvas.style = `display: block; width: 100%; aspect-ratio: ${size.join(" / ")}`;
-    back.src = URL.createObjectURL(new Blob([background], { type: "image/png" }));
-    await back.decode();
-    URL.revokeObjectURL(back.src);
     el.append(canvas);
 
     // The states of one version, by their indices. They become invalid when another control moves.
@@ -31,7 +28,6 @@ export default {
       rbcourseDisplay.draw(canvas, back, made, styles, state);
       said.set("value", rbcourseDisplay.table(rows, noted || notice));
       rbcourseDisplay.tell(canvas, line);
-      canvas.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
     };
 
     // Show the present state, or the nearest known state until the present one arrives.
@@ -89,11 +85,10 @@ export default {
 
     // Names for screen readers and the reset of the time belong to the panel beside the picture.
     const label = (panel) => {
-      for (const slider of panel.querySelectorAll(".widget-slider")) {
-        const [name, value] = [".widget-label", ".widget-readout"].map((part) => slider.querySelector(part));
-        const handle = slider.querySelector(".noUi-handle");
-        handle?.setAttribute("aria-label", name?.textContent ?? "");
-        handle?.setAttribute("aria-valuetext", value?.textContent ?? "");
+      for (const handle of panel.querySelectorAll(".noUi-handle")) {
+        const text = (part) => handle.closest(".widget-slider").querySelector(part)?.textContent ?? "";
+        handle.ariaLabel = text(".widget-label");
+        handle.ariaValueText = text(".widget-readout");
       }
       panel.querySelectorAll(".widget-play button").forEach((button, i) => {
         button.title = ["Play or pause", "Stop"][i] ?? "";

@@ -149,9 +149,8 @@ def write(decks: dict[str, Deck], folder: Path, ready: Callable[[str], str] = st
     shutil.copytree(STATIC / "vendor", shared, dirs_exist_ok=True)
     for name in ("slides.css", "sketch.css", "slides.js"):
         shutil.copyfile(STATIC / name, shared / name)
-    # reveal.js scales slides; with `window.pixels`, a canvas has as many pixels as on the screen
-    engine = ENGINE.replace("window.devicePixelRatio", "window.pixels") + COMPUTED
-    texts = {"shared/display.js": engine.replace("lineWidth: line", "lineWidth: 1.4 * line")}
+    engine = (ENGINE + COMPUTED).replace("lineWidth: line", "lineWidth: 1.4 * line")
+    texts = {"shared/display.js": engine}
     for name, deck in decks.items():
         texts[f"{name}.html"] = ready(deck_page(deck))
         if deck.sheet:

@@ -5,7 +5,6 @@ const printing = /[?&](print-pdf|view=print)/.test(location.search);
 const hold = /[?&]hold/.test(location.search) && Object.assign(new Image(), { src: "hold" }); // see serve.py
 const voting = /[?&]token=/.test(location.search) && window === window.top;
 const sections = all(".slides section section");
-Object.defineProperty(window, "pixels", { get: () => window.devicePixelRatio * Reveal.getScale() }); // for display.js
 
 // Enlarge a picture with its controls as far as its place allows, and cut off white margins.
 const fit = (figure) => {
@@ -133,7 +132,6 @@ const show = ({ currentSlide }) => {
 };
 
 const begin = async () => {
-  document.documentElement.classList.toggle("dark", /[?&]dark/.test(location.search));
   await MathJax.startup.promise;
   await Promise.all([...document.fonts].map((font) => font.load()));
   await Promise.all(all("figure > img").map((image) => image.decode()));
