@@ -1,7 +1,5 @@
 """The configuration of Sphinx for the sources of the book; Sphinx reads this file itself."""
 
-import base64
-import gzip
 import json
 import os
 import re
@@ -100,8 +98,7 @@ def write_texts(app: Any, failed: Exception | None) -> None:
         apart = {"comment", "math", "math_block", "raw"}
         shown = [x.astext() for x in leaves if not {x.tagname, x.parent.tagname} & apart]
         texts[name] = re.sub(r"\s+", " ", " ".join(shown))
-    content = gzip.compress(json.dumps(texts, ensure_ascii=False).encode(), mtime=0)
-    text = f"showExcerpts({json.dumps(base64.b64encode(content).decode())});\n"
+    text = f"window.rbcourseTexts = {json.dumps(texts, ensure_ascii=False)};\n"
     (Path(app.outdir) / "_static" / "texts.js").write_text(text, encoding="utf-8", newline="\n")
 
 

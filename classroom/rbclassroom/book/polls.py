@@ -1,4 +1,4 @@
-"""Show the options of polls as buttons; each option shows only its own explanation."""
+"""Show the options of polls; each option unfolds its own explanation, and closes the others."""
 
 import re
 
@@ -33,7 +33,7 @@ def ideas(texts: list[str]) -> tuple[str, dict[str, str]]:
 
 
 def voted(cells: list[NotebookNode]) -> None:
-    """Turn the options of all polls in the cells of a lesson into buttons with explanations.
+    """Let the options of all polls in the cells of a lesson unfold their explanations.
 
     The cells with the buttons for JupyterLab are removed.
     """
@@ -50,22 +50,22 @@ def voted(cells: list[NotebookNode]) -> None:
         letters = {option[1] for option in _OPTION.finditer(texts[k])}
         if missing := letters - set(lines):
             raise ValueError(f"{poll[1]}: the answer does not explain {', '.join(sorted(missing))}")
-        cells[k].source = _with_buttons(texts[k], poll[1], right, lines)
+        cells[k].source = _with_ideas(texts[k], poll[1], right, lines)
 
 
-def _with_buttons(text: str, name: str, right: str, lines: dict[str, str]) -> str:
+def _with_ideas(text: str, name: str, right: str, lines: dict[str, str]) -> str:
     def put(option: re.Match[str]) -> str:
         letter, words = option[1], re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", option[2])
         is_right = letter == right
         line = lines[letter].replace("\n", "\n  ")
-        button = f'<button type="button" aria-expanded="false">**{letter}** <span>{words}</span>'
         return (
-            f"- {button}</button>\n\n"
-            f'  <div role="status"><div class="idea{" right" * is_right}" hidden>\n\n'
-            f"  *{'Right.' if is_right else 'Not quite.'}* {line}\n\n  </div></div>\n"
+            f'- <details name="{name}"><summary>\n\n'
+            f"  **{letter}** <span>{words}</span>\n\n"
+            f'  </summary><div role="status" class="idea{" right" * is_right}">\n\n'
+            f"  *{'Right.' if is_right else 'Not quite.'}* {line}\n\n  </div></details>\n"
         )
 
     options = _OPTION.sub(put, text)
-    first = options.index("- <button")
+    first = options.index("- <details")
     group = f'<div class="poll" role="group" aria-label="{name}">'
     return f"{options[:first]}{group}\n\n{options[first:]}\n</div>"

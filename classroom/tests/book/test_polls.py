@@ -13,9 +13,9 @@ from rbclassroom.lecture.slides import deck_of
 
 PATHS = lesson_paths(Path(__file__).parents[3] / "notebooks")
 OPTION = re.compile(
-    r'^- <button type="button" aria-expanded="false">\*\*([A-Z])\*\* <span>.+</span></button>\n\n'
-    r'  <div role="status"><div class="idea( right)?" hidden>\n\n'
-    r"  (.*(?:\n.*)*?)\n\n  </div></div>$",
+    r'^- <details name="Poll \d+"><summary>\n\n  \*\*([A-Z])\*\* <span>.+</span>\n\n'
+    r'  </summary><div role="status" class="idea( right)?">\n\n'
+    r"  (.*(?:\n.*)*?)\n\n  </div></details>$",
     re.MULTILINE,
 )
 

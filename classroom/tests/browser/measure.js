@@ -22,7 +22,7 @@
   }
 
   // Check that a finger can use the controls.
-  for (const element of innerWidth < 500 ? content.querySelectorAll("figure :is(button, input), summary, .poll button, .buttons > *") : []) {
+  for (const element of innerWidth < 500 ? content.querySelectorAll("figure :is(button, input), summary, .buttons > *") : []) {
     const { width, height } = element.getBoundingClientRect();
     const least = element.type === "range" ? 220 : 44;
     if (shown(element) && (height < 43.5 || width < least - 0.5)) faults.push(`small for a finger, ${width} × ${height}: ${name(element)}`);

@@ -1,20 +1,6 @@
-// Scripts of the book's pages, for polls, folded code, wide formulas, excerpts and the ledger.
+// Scripts of the book's pages, for folded code, wide formulas, excerpts and the ledger.
 addEventListener("DOMContentLoaded", () => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
-
-  // An option of a poll shows its own explanation and hides the others.
-  for (const poll of all(".poll")) {
-    const buttons = all("button", poll), line = (button) => button.closest("li").querySelector(".idea");
-    for (const button of buttons) {
-      button.onclick = () => {
-        const open = button.ariaExpanded !== "true";
-        for (const each of buttons) {
-          each.ariaExpanded = open && each === button;
-          line(each).hidden = each.ariaExpanded !== "true";
-        }
-      };
-    }
-  }
 
   const code = document.querySelector("#all-code");
   code?.addEventListener("click", () => {
@@ -26,15 +12,13 @@ addEventListener("DOMContentLoaded", () => {
   // Keep a formula and the punctuation marks next to it on one line.
   const join = () => {
     for (const formula of all("span.math:has(> mjx-container)")) {
-      const before = formula.previousSibling, after = formula.nextSibling, whole = document.createElement("span");
-      const start = before?.nodeType === 3 ? before.data.match(/[^\s]{0,3}$/)[0] : "";
-      const end = after?.nodeType === 3 ? after.data.match(/^[^\s\p{L}]{0,4}/u)[0] : "";
-      if (!end && !/[(“‘]$/.test(start)) continue;
-      whole.className = "whole";
-      formula.replaceWith(whole);
-      if (/[(“‘]$/.test(start)) { before.data = before.data.slice(0, -start.length); whole.append(start); }
-      whole.append(formula, end);
-      if (end) after.data = after.data.slice(end.length);
+      const { previousSibling: before, nextSibling: after } = formula, part = new Range();
+      const start = before?.data?.search(/\S{0,2}[(“‘]$/) ?? -1, end = after?.data?.match(/^[^\s\p{L}]{0,4}/u)[0].length;
+      if (start < 0 && !end) continue;
+      part.selectNode(formula);
+      if (start >= 0) part.setStart(before, start);
+      if (end) part.setEnd(after, end);
+      part.surroundContents(Object.assign(document.createElement("span"), { className: "whole" }));
     }
   };
 
@@ -79,12 +63,10 @@ addEventListener("DOMContentLoaded", () => {
     const sizes = cuts.slice(1).map((end, k) => end - cuts[k]), widest = Math.max(...sizes);
     const [width, height] = image.style.aspectRatio.split("/");
     part.append(...sizes.map((size, k) => {
-      const column = document.createElement("span"), copy = image.cloneNode();
-      column.className = "column";
-      column.style = `width: ${(100 * size) / widest}%; aspect-ratio: ${(size * width) / height}`;
-      copy.style = `--whole: ${100 / size}%; margin-left: ${(-100 * cuts[k]) / size}%`;
-      if (k) copy.alt = ""; // the first column has the description
-      column.append(copy);
+      const column = image.cloneNode();
+      column.className = "column"; // it covers its box with the picture, and shows the part from cuts[k]
+      column.style = `--share: ${(100 * size) / widest}%; aspect-ratio: ${(size * width) / height}; object-position: ${(100 * cuts[k]) / (1 - size)}%`;
+      if (k) column.alt = ""; // the first column has the description
       return column;
     }));
     image.replaceWith(part);
@@ -93,11 +75,8 @@ addEventListener("DOMContentLoaded", () => {
   // The picture of the start page plays once when it becomes visible. All controls except
   // the slider are folded under "More".
   const hero = document.querySelector("figure.hero");
-  const ready = new MutationObserver(() => {
-    const canvas = hero.querySelector("canvas"), slider = all("input", hero).at(-1);
-    if (!canvas || !slider) return;
-    ready.disconnect();
-    const panel = slider.parentNode.parentNode, more = document.createElement("details");
+  hero?.addEventListener("drawn", ({ target: canvas }) => {
+    const slider = all("input", hero).at(-1), panel = slider.parentNode.parentNode, more = document.createElement("details");
     more.innerHTML = "<summary>More: turn the picture, change it, see its numbers</summary>";
     more.append(...[...panel.children].filter((child) => child !== slider.parentNode), ...all("figcaption", hero));
     panel.append(more);
@@ -118,29 +97,21 @@ addEventListener("DOMContentLoaded", () => {
       end();
     }, { threshold: 0.6 });
     seen.observe(canvas);
-  });
-  if (hero) ready.observe(hero, { childList: true, subtree: true });
+  }, { once: true });
 
   // Show an excerpt of the page below each search result.
   const results = document.querySelector("#search-results");
   if (!results) return;
   const words = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase().split(/\s+/).filter(Boolean);
-  let texts = {};
   const tell = () => {
     for (const link of all("li:not(:has(.excerpt)) > a", results)) {
-      const name = link.getAttribute("href").replace(/\.html.*/, ""), text = texts[name] ?? "";
+      const name = link.getAttribute("href").replace(/\.html.*/, ""), text = window.rbcourseTexts?.[name] ?? "";
       const at = Math.max(0, text.toLowerCase().indexOf(words[0])), from = at < 60 ? 0 : text.indexOf(" ", at - 60) + 1;
       const said = `${from ? "… " : ""}${text.slice(from, text.indexOf(" ", from + 180))} …`;
       if (text) link.after(Object.assign(document.createElement("p"), { className: "excerpt", textContent: said }));
     }
   };
-  window.showExcerpts = async (packed) => {
-    const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
-    const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    texts = await new Response(plain).json();
-    tell();
-  };
-  document.head.append(Object.assign(document.createElement("script"), { src: "_static/texts.js" }));
+  document.head.append(Object.assign(document.createElement("script"), { src: "_static/texts.js", onload: tell }));
   new MutationObserver(tell).observe(results, { childList: true, subtree: true });
 });
 
