@@ -4,12 +4,9 @@ window.rbcourseEngine = (() => {
   const facts = FACTS;
   let worker, finish, turn = Promise.resolve();
 
-  // Return the reason why Python cannot run here, or an empty text.
-  function missing() {
-    if (location.protocol === "file:") return "This page was opened from a file. Python runs only in a page from a web server. Open the book on the web, or serve it by: python3 course.py book --live --serve";
-    const old = ["Worker", "WebAssembly", "DecompressionStream"].find((name) => !window[name]);
-    return old ? `This browser is too old to run Python: it has no ${old}.` : "";
-  }
+  // The reason why Python cannot run here, or an empty text.
+  const missing = location.protocol !== "file:" ? ""
+    : "This page was opened from a file. Python runs only in a page from a web server. Open the book on the web, or serve it by: python3 course.py book --live --serve";
 
   // Run a cell, { above, source, files } or a promise of it, when earlier runs are done. Return "done" or "stopped".
   // show(kind, content) shows the outputs; the kinds are text, html, hint, error, clear, and loaded (a number of bytes).
@@ -20,7 +17,7 @@ window.rbcourseEngine = (() => {
         stop();
       };
       finish = resolve;
-      if (missing()) return reject(new Error(missing()));
+      if (missing) return reject(new Error(missing));
       const own = (worker ??= new Worker(`${folder}worker.js`));
       own.onerror = (event) => fail(event.message || "The files of Python could not be loaded.");
       own.onmessage = ({ data: [kind, content] }) => {

@@ -1,5 +1,5 @@
 // Editors and outputs for cells of lessons and for problem sets. The browser stores the answers to problems.
-addEventListener("DOMContentLoaded", () => {
+addEventListener("DOMContentLoaded", async () => {
   const engine = window.rbcourseEngine, about = engine.facts;
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
   const name = location.pathname.split("/").at(-1).replace(/\.html$/, "");
@@ -14,41 +14,33 @@ addEventListener("DOMContentLoaded", () => {
   const cells = [...all(".cell.tag_imports"), ...all(".cell:not(.tag_imports)")].filter((part) => part.querySelector(".cell_input"));
   const texts = new Map(cells.map((part) => [part, part.querySelector(".cell_input pre").textContent.trimEnd()]));
 
-  // Make a text area; for code, it becomes a CodeMirror editor. The function edit replaces the text.
-  let script;
+  // Load the editor for code, once.
+  let loading;
+  const codeMirror = () => (loading ??= new Promise((onload, onerror) => document.head.append(make("script", { src: `${engine.folder}codemirror.js`, onload, onerror }))));
+
+  // Make an editor; code has a function `go` that runs it. The function edit replaces the text.
   function editor(text, label, changed, go) {
-    const area = make("textarea", { value: text, ariaLabel: label, spellcheck: !go, rows: text.split("\n").length });
-    const part = make("div", { className: "editor" }, area);
-    let view;
-    area.oninput = () => changed(area.value);
-    async function upgrade() {
-      await (script ??= new Promise((onload, onerror) => document.head.append(make("script", { src: `${engine.folder}codemirror.js`, onload, onerror }))));
-      if (view) return;
-      const { EditorView, Prec, keymap, ...more } = CodeMirror;
-      const { selectionStart: anchor, selectionEnd: head } = area, focused = document.activeElement === area;
-      view = new EditorView({
-        parent: part,
-        doc: area.value,
-        selection: { anchor, head },
-        extensions: [
-          Prec.highest(keymap.of(["Shift-Enter", "Mod-Enter"].map((key) => ({ key, run: () => (go(), true) })))),
-          keymap.of([...more.defaultKeymap, ...more.historyKeymap, more.indentWithTab]),
-          more.history(), more.lineNumbers(), more.bracketMatching(), more.indentOnInput(), more.python(), EditorView.lineWrapping,
-          more.indentUnit.of("    "), more.syntaxHighlighting(more.classHighlighter),
-          EditorView.contentAttributes.of({ "aria-label": `${label}; to leave it, press Escape, then Tab` }),
-          EditorView.updateListener.of((update) => update.docChanged && changed(view.state.doc.toString())),
-        ],
-      });
-      area.remove();
-      if (focused) view.focus();
+    const part = make("div", { className: "editor" });
+    if (!go) {
+      const area = make("textarea", { value: text, ariaLabel: label, rows: text.split("\n").length });
+      area.oninput = () => changed(area.value);
+      part.append(area);
+      return { part, edit: (now) => changed((area.value = now)) };
     }
-    if (go) area.onfocus = () => upgrade().catch(() => {}); // without CodeMirror the text area is used
-    const edit = (now) => {
-      if (view) return view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert: now } });
-      area.value = now;
-      changed(now);
-    };
-    return { part, edit, upgrade };
+    const { EditorView, Prec, keymap, ...more } = CodeMirror;
+    const view = new EditorView({
+      parent: part,
+      doc: text,
+      extensions: [
+        Prec.highest(keymap.of(["Shift-Enter", "Mod-Enter"].map((key) => ({ key, run: () => (go(), true) })))),
+        keymap.of([...more.defaultKeymap, ...more.historyKeymap, more.indentWithTab]),
+        more.history(), more.lineNumbers(), more.bracketMatching(), more.indentOnInput(), more.python(), EditorView.lineWrapping,
+        more.indentUnit.of("    "), more.syntaxHighlighting(more.classHighlighter),
+        EditorView.contentAttributes.of({ "aria-label": `${label}; to leave it, press Escape, then Tab` }),
+        EditorView.updateListener.of((update) => update.docChanged && changed(view.state.doc.toString())),
+      ],
+    });
+    return { part, edit: (insert) => view.dispatch({ changes: { from: 0, to: view.state.doc.length, insert } }) };
   }
 
   // Make the element that shows outputs.
@@ -69,19 +61,10 @@ addEventListener("DOMContentLoaded", () => {
         text.textContent = text.whole.replace(/[^\n]*\r(?=[^\n])/g, "").replaceAll("\r", "");
       } else if (kind === "html") {
         text = null;
-        part.append(revived(content));
+        part.append(document.createRange().createContextualFragment(content)); // its scripts run
       } else if (content) part.append(make(kind === "error" ? "pre" : "p", { className: kind, textContent: content }));
     };
     return { part, show };
-  }
-
-  // Return HTML as an element whose names are unique and whose scripts run.
-  let count = 0;
-  function revived(html) {
-    for (const [, id] of html.matchAll(/<img id="(\w+)"/g)) html = html.replaceAll(id, `${id}_${++count}`);
-    const part = make("div", { innerHTML: html });
-    setTimeout(() => all("script", part).forEach((each) => each.replaceWith(make("script", { textContent: each.textContent }))));
-    return part;
   }
 
   const isTest = (cell) => cell.matches(".tag_test"), answers = new Map(), file = "my_motion.py";
@@ -108,7 +91,7 @@ addEventListener("DOMContentLoaded", () => {
       shown.className = "outputs";
       [act.disabled, halt.hidden] = [true, false]; // the buttons show the state of the run
       try {
-        if ((await engine.run(engine.missing() ? {} : read(cell), show)) === "stopped") show("error", "Stopped.");
+        if ((await engine.run(engine.missing ? {} : read(cell), show)) === "stopped") show("error", "Stopped.");
         document.body.classList.add("python-is-there"); // from now on the buttons show no size
       } catch (error) {
         show("error", error.message);
@@ -122,7 +105,7 @@ addEventListener("DOMContentLoaded", () => {
       texts.set(cell, text);
       shown.className = "outputs stale";
     };
-    const { part: edited, edit, upgrade } = editor(texts.get(cell), label, (text) => {
+    const { part: edited, edit } = editor(texts.get(cell), label, (text) => {
       if (text === texts.get(cell)) return;
       put(text);
       changed(text);
@@ -131,7 +114,7 @@ addEventListener("DOMContentLoaded", () => {
     const halt = Object.assign(button("Stop", engine.stop), { hidden: true });
     const reset = button("Reset", () => sure() && edit(stub));
     const bar = make("div", { className: "bar" }, ...(word ? [act, halt] : ["A person grades this answer. "]), reset);
-    return { edited, bar, shown, show, put, edit, upgrade, go };
+    return { edited, bar, shown, show, put, edit, go };
   }
   function differences(part) {
     if (document.querySelector(".differences")) return;
@@ -144,27 +127,26 @@ addEventListener("DOMContentLoaded", () => {
   // Lessons: "Try it" turns a cell into an editor and runs it. The stored output is kept.
   for (const part of all(".cell[class*=tag_try-]")) {
     const code = part.querySelector(".cell_input");
-    const start = button("Try it", () => {
+    const start = button("Try it", async () => {
+      await codeMirror();
       start.remove();
       part.querySelector("details")?.setAttribute("open", ""); // the code may be folded
-      const { edited, bar, shown, upgrade, go } = runnable(part, { label: "Code of this cell", word: "Run", stub: texts.get(part) });
-      go(); // Python is loaded while the editor is made
+      const { edited, bar, shown, go } = runnable(part, { label: "Code of this cell", word: "Run", stub: texts.get(part) });
+      go();
       code.querySelector(".highlight").replaceWith(edited);
       code.after(bar, shown);
       differences(code);
-      upgrade().catch(() => {});
     }, "try", size());
     part.prepend(start);
   }
 
-  // Problem sets. The browser stores answers by page and cell, unless it forbids this.
-  const key = (id) => `${location.pathname} ${id}`;
-  const stored = (id) => { try { return localStorage.getItem(key(id)); } catch { return null; } };
-  let forbidden = false;
+  // Problem sets. The browser stores answers by page and cell. If it forbids this, they last as long as the page.
+  let shelf = {}, forbidden = false;
+  try { shelf = localStorage; } catch { forbidden = true; }
+  const write = (at, text) => { try { shelf[at] = text; } catch { forbidden = true; } };
+  const key = (id) => `${location.pathname} ${id}`, store = (id, text) => write(key(id), text);
   // The file of all sets with the student's own functions: the browser stores it beside the answers.
-  const place = `${location.pathname.replace(/[^/]*$/, "")}${file}`;
-  let whole;
-  const functions = () => { try { return localStorage.getItem(place) ?? ""; } catch { return whole ?? ""; } };
+  const place = `${location.pathname.replace(/[^/]*$/, "")}${file}`, functions = () => shelf[place] ?? "";
   async function keep() {
     const passed = [...answers].filter(([, answer]) => !answer.isOpen()).map(([id]) => id.replace(/-answer$/, ""));
     const named = cells.map((part, k) => [k ? /tag_answer-([\w-]+)/.exec(part.className)?.[1] : "setup", texts.get(part)]);
@@ -174,12 +156,10 @@ addEventListener("DOMContentLoaded", () => {
     const source = "from rbclassroom.assignments.my_motion import kept\nprint(kept())";
     await engine.run({ above: [], source, files }, (kind, text) => (out += kind === "text" ? text : ""));
     const [text, said] = JSON.parse(out);
-    whole = text;
-    try { localStorage.setItem(place, text); } catch { forbidden = true; }
+    write(place, text);
     tell();
     if (said) status.textContent += ` ${said}.`;
   }
-  const store = (id, text) => { try { localStorage.setItem(key(id), text); } catch { forbidden = true; } };
   const status = make("p", { className: "kept", role: "status" });
   const mine = button(`Download ${file}`, () => give(functions(), file, "text/x-python"));
   const tell = () => {
@@ -187,14 +167,15 @@ addEventListener("DOMContentLoaded", () => {
     mine.hidden = !functions();
     status.textContent = forbidden
       ? "This browser does not keep your answers, perhaps because the window is private. Download them before you close the window."
-      : stored("downloaded")
+      : shelf[key("downloaded")]
       ? `Your answers are in the file ${name}.ipynb that you downloaded, and in this browser.` + (open ? ` ${open} of ${answers.size} answers are empty or have not passed the check.` : "")
       : "Your answers are kept in this browser, on this machine only, until you clear its data. Download them to hand them in or to move them to another machine.";
   };
+  if (document.querySelector(".cell[class*=tag_answer-]")) await codeMirror();
   for (const part of all(".cell[class*=tag_answer-], .answer-in-words")) {
     const words = part.matches(".answer-in-words"), id = words ? part.id : /tag_answer-([\w-]+)/.exec(part.className)[1];
     const heading = part.closest("section").querySelector("h1, h2, h3").firstChild.textContent, stub = texts.get(part) ?? "";
-    texts.set(part, stored(id) ?? stub);
+    texts.set(part, shelf[key(id)] ?? stub);
     const changed = (text) => {
       store(id, text);
       store("downloaded", "");
@@ -212,7 +193,7 @@ addEventListener("DOMContentLoaded", () => {
     part.classList.add("live");
     part.replaceChildren(answer.edited, answer.bar, answer.shown);
     if (!words) differences(answer.edited);
-    if (stored(`${id} right`) !== texts.get(part)) continue;
+    if (shelf[key(`${id} right`)] !== texts.get(part)) continue;
     answer.shown.classList.add("right");
     answer.show("text", "This answer passed your last check.");
   }
@@ -244,7 +225,7 @@ addEventListener("DOMContentLoaded", () => {
   const field = make("input", { type: "file", accept: ".ipynb", ariaLabel: "Open a downloaded file", hidden: true });
   field.onchange = () => open(field.files[0]).catch((error) => (status.textContent = `The file was not opened: ${error.message}.`)).finally(() => (field.value = ""));
   const save = button(`Download ${name}.ipynb`, () => download().catch((error) =>
-    (status.textContent = engine.missing() || `Nothing was downloaded: ${error.message}. Try again.`)));
+    (status.textContent = engine.missing || `Nothing was downloaded: ${error.message}. Try again.`)));
   const end = make("div", { className: "hand-in" }, make("div", { className: "bar" }, save, button("Open a downloaded file", () => field.click()), field, mine), status);
   (document.querySelector("#before-you-hand-in") ?? document.querySelector("article")).append(end);
   tell();
