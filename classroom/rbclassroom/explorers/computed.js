@@ -5,6 +5,7 @@ rbcourseDisplay.computed = (() => {
   const range = (n) => Array.from({ length: n }, (_, k) => k), unit = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   const dot = (p, q) => p.reduce((sum, x, k) => sum + x * q[k], 0), plus = (p, q) => p.map((x, k) => x + q[k]);
   const scaled = (factor, p) => p.map((x) => factor * x), mean = (some) => scaled(1 / some.length, some.reduce(plus));
+  const minus = (p, q) => plus(p, scaled(-1, q)), between = (p, q, share) => plus(p, scaled(share, minus(q, p)));
   const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
 
   // Return numbers as text, separated by commas; halves are rounded to even, and zero has no minus sign.
@@ -76,7 +77,7 @@ rbcourseDisplay.computed = (() => {
     },
     // The quaternion at a share of the short arc between two unit quaternions.
     slerp(p, q, t) {
-      const near = scaled(dot(p, q) < -9e-16 ? -1 : 1, q), angle = atan2(hypot(...plus(near, scaled(-1, p))), hypot(...plus(near, p)));
+      const near = scaled(dot(p, q) < -9e-16 ? -1 : 1, q), angle = atan2(hypot(...minus(near, p)), hypot(...plus(near, p)));
       if (angle < 1e-9) return p;
       return plus(scaled(sin(2 * (1 - t) * angle) / sin(2 * angle), p), scaled(sin(2 * t * angle) / sin(2 * angle), near));
     },
@@ -99,10 +100,7 @@ rbcourseDisplay.computed = (() => {
       const columns = [];
       for (let q of math.transpose(M)) {
         const size = hypot(...q);
-        for (const p of [...columns, ...columns]) {
-          const along = q.reduce((sum, x, k) => sum + x * p[k], 0);
-          q = q.map((x, k) => x - along * p[k]);
-        }
+        for (const p of [...columns, ...columns]) q = minus(q, scaled(dot(q, p), p));
         if (hypot(...q) <= 2.7e-15 * size) return null;
         columns.push(q.map((x) => x / hypot(...q)));
       }
@@ -120,17 +118,17 @@ rbcourseDisplay.computed = (() => {
   const arm = {
     title: "The arm",
     show([theta0, theta1, t]) {
-      const joints = (share) => math.arm_forward_kinematics(start.map((x, k) => x + share * (radians([theta0, theta1][k]) - x)), links);
-      const now = joints(t), [, elbow, end] = joints(1), q = start.map((x, k) => x + t * (radians([theta0, theta1][k]) - x));
+      const q = (share) => between(start, [theta0, theta1].map(radians), share);
+      const joints = (share) => math.arm_forward_kinematics(q(share), links), now = joints(t), [, elbow, end] = joints(1);
       return {
         points: {
           way: range(61).map((k) => joints((t * k) / 60)[2]),
           goal: [end],
           "goal name": [beside(end, end[1] - elbow[1], elbow[0] - end[0])],
           links: now,
-          "hand name": hypot(...plus(end, scaled(-1, now[2]))) > 0.5 ? [beside(now[2], now[2][0] - now[1][0], now[2][1] - now[1][1])] : [],
+          "hand name": hypot(...minus(end, now[2])) > 0.5 ? [beside(now[2], now[2][0] - now[1][0], now[2][1] - now[1][1])] : [],
         },
-        said: [["angles", `(${numbers(q.map(degrees), 1)})°`], ["hand", `(${numbers(now[2], 2)}) m`]],
+        said: [["angles", `(${numbers(q(t).map(degrees), 1)})°`], ["hand", `(${numbers(now[2], 2)}) m`]],
       };
     },
     // A goal moves the arm to it. A click or a drag sets the goal; the elbow stays on its side.
@@ -156,7 +154,7 @@ rbcourseDisplay.computed = (() => {
           chord: [first, last],
           ray: [[0, 0], on(now)],
           even: [on(t)],
-          line: [first.map((x, k) => x + t * (last[k] - x))],
+          line: [between(first, last, t)],
           "line name": [[last[0] + 0.06, last[1] - 0.04]],
           shadow: [on(now)],
           theta: times.map((time) => [time, math.theta(time, a)]),
@@ -167,18 +165,19 @@ rbcourseDisplay.computed = (() => {
       };
     },
   };
+
+  // The axes of a frame, and their letters.
+  const lettered = (name, matrix) => Object.fromEntries(math.transpose(matrix).flatMap((column, k) => {
+    const axis = `${name} ${"xyz"[k]}`;
+    return [[axis, [[0, 0, 0], column]], [`${axis} letter`, [scaled(1.2, column)]]];
+  }));
   const projection = {
     title: "Two repairs",
     show([e12, e23, e33, pull]) {
       const M = [[1, pull * e12, 0], [0, 1, pull * e23], [0, 0, 1 + pull * e33]];
-      const R = math.project_so(M), G = math.orthonormalize_gram_schmidt(M), det = math.det(M), points = {};
+      const R = math.project_so(M), G = math.orthonormalize_gram_schmidt(M), det = math.det(M);
       const flat = [[0, 0, 0], [0, 0, 0], [0, 0, 0]], fate = !G ? "none: M is flat" : math.det(G) > 0 ? "" : "a mirror";
-      for (const [name, matrix] of [["M", M], ["nearest", R], ["Gram–Schmidt", G ?? flat]]) {
-        math.transpose(matrix).forEach((column, k) => {
-          points[`${name} ${"xyz"[k]}`] = [[0, 0, 0], column];
-          points[`${name} ${"xyz"[k]} letter`] = [column.map((x) => 1.2 * x)];
-        });
-      }
+      const points = { ...lettered("M", M), ...lettered("nearest", R), ...lettered("Gram–Schmidt", G ?? flat) };
       const singular = math.eigh(math.matmul(math.transpose(R), M))[0].map(abs).sort((a, b) => b - a);
       const far = (S) => hypot(...M.flatMap((row, i) => row.map((x, j) => x - S[i][j])));
       const said = [
@@ -247,17 +246,13 @@ rbcourseDisplay.computed = (() => {
       const r = math.log_so3(R), angle = hypot(...r), axis = angle ? scaled(1 / angle, r) : r;
       const second = [-sin(angles[0]), cos(angles[0]), 0], turns = [unit[2], second, columns[0]];
       const side = Math.sign(dot(turns.reduce(plus), axis)) || 1; // not at the ends where the other names are
-      const points = { box: box([1.3, 0.8, 0.25], R, [0, 0, 0]) };
+      const points = { box: box([1.3, 0.8, 0.25], R, [0, 0, 0]), ...lettered("body", R) };
       const named = [["first turn", turns[0], -1, 1.3, 0.65], ["second turn", second, -1, LEAST, 0.87],
         ["third turn", columns[0], -1, LEAST, 0.71], ["one axis for all", axis, side, 1.23, 1.03]];
       for (const [name, along, sign, far, wide] of named) {
         points[name] = [scaled(-sign * LEAST, along), scaled(sign * far, along)];
         points[`${name} name`] = [beyond(scaled(sign * far, along), [wide, 0.28])];
       }
-      columns.forEach((column, k) => {
-        points[`body ${"xyz"[k]}`] = [[0, 0, 0], column];
-        points[`body ${"xyz"[k]} letter`] = [scaled(1.2, column)];
-      });
       const lines = R.map((row) => row.map((x) => numbers([x], 3).padStart(6, "\u2007")).join("  ")).join("\n");
       const said = [["matrix", lines], ["quaternion", numbers(math.quaternion_from_matrix(R), 2)],
         ["axis", angle ? numbers(axis, 2) : "any"], ["angle", `${numbers([degrees(angle)], 1)}°`]];
@@ -276,7 +271,7 @@ rbcourseDisplay.computed = (() => {
       const along = [sin(radians(tilt)), 0, cos(radians(tilt))], goal = [x, 0, z], edges = [0.8, 0.8, 0.8];
       const w = scaled(radians(angle === -180 ? 180 : angle), along), { axis, point, slide } = math.screw_from_pose(w, goal);
       const turned = (share) => math.exp_so3(scaled(share, w)), R = turned(t), steps = range(101).map((k) => (t * k) / 100);
-      const around = (share) => plus(scaled(share * slide, axis), plus(point, scaled(-1, turned(share).map((row) => dot(row, point)))));
+      const around = (share) => plus(scaled(share * slide, axis), minus(point, turned(share).map((row) => dot(row, point))));
       const places = { geodesic: scaled(t, goal), screw: angle ? around(t) : scaled(t, goal) };
       const points = {
         axis: [-1.8, 1.8].map((far) => plus(point, scaled(far, axis))),
@@ -291,7 +286,7 @@ rbcourseDisplay.computed = (() => {
         points[`${name} name`] = [plus(place, [0, 0, name === "screw" ? -up : up])];
         said.push([`turned, ${name}`, `${numbers([t * abs(angle)], 1)}°`]);
       }
-      const gap = hypot(...plus(places.screw, scaled(-1, places.geodesic))), far = hypot(...point) > 3 ? ", not in sight" : "";
+      const gap = hypot(...minus(places.screw, places.geodesic)), far = hypot(...point) > 3 ? ", not in sight" : "";
       said.push(["origins apart", `${numbers([gap], 2)} m`],
         ["its axis through", angle ? `(${numbers(point, 1)}) m${far}` : "none"],
         ["slide along it", angle ? `${numbers([slide / hypot(...w)], 2)} m per rad` : "all of the way"]);
@@ -304,13 +299,12 @@ rbcourseDisplay.computed = (() => {
     show([...values]) {
       const t = values.pop(), times = range(201).map((k) => k / 200), points = {}, said = [];
       const ends = [values.slice(0, 3), values.slice(3)].map((angles) => angles.map(radians));
-      const blend = ([a, b], share) => plus(scaled(1 - share, a), scaled(share, b));
       const R = ends.map(math.matrix_from_zyx), logs = R.map(math.log_so3), q = ends.map(math.quaternion_from_zyx);
       const ways = {
-        "ZYX angles": (share) => math.matrix_from_zyx(blend(ends, share)),
-        "matrix entries": (share) => range(3).map((i) => blend([R[0][i], R[1][i]], share)),
+        "ZYX angles": (share) => math.matrix_from_zyx(between(...ends, share)),
+        "matrix entries": (share) => range(3).map((i) => between(R[0][i], R[1][i], share)),
         quaternions: (share) => math.matrix_from_quaternion(math.slerp(...q, share)),
-        "rotation vectors": (share) => math.exp_so3(blend(logs, share)),
+        "rotation vectors": (share) => math.exp_so3(between(...logs, share)),
       };
       for (const [way, at] of Object.entries(ways)) {
         const path = times.map(at), now = at(t), nose = path.filter((_, k) => k % 4 === 0).map((M) => M.map((row) => row[0]));
@@ -334,7 +328,7 @@ rbcourseDisplay.computed = (() => {
 
   // Return the drawing of a face. It is the lighter, the more the face is turned to the light, as in space.py.
   function shaded({ style: [old, ...style] }, corners, colour, middle) {
-    const n = rbcourseScene.normal(corners), side = Math.sign(dot(n, plus(mean(corners), scaled(-1, middle))));
+    const n = rbcourseScene.normal(corners), side = Math.sign(dot(n, minus(mean(corners), middle)));
     const light = Math.round(32 * (0.84 + 0.16 * side * dot(n, [0.48, -0.36, 0.8]))) / 32;
     const parts = [1, 3, 5].map((k) => Math.round(light * parseInt(colour.slice(k, k + 2), 16)));
     const fill = `#${parts.map((part) => Math.min(255, part).toString(16).padStart(2, "0")).join("")}${old.slice(7)}`;
