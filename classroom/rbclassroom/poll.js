@@ -1,13 +1,7 @@
 // The buttons of a poll. In JupyterLab a choice opens the answer below, and Shift+Enter passes a closed answer.
-const guarded = new WeakSet();
-
-function guard(notebook) {
-  if (!notebook?.activeCellChanged || guarded.has(notebook)) return;
-  guarded.add(notebook);
-  notebook.activeCellChanged.connect(() => {
-    const open = notebook.widgets.findIndex((cell, at) => at >= notebook.activeCellIndex && !cell.isHidden);
-    if (open > notebook.activeCellIndex) notebook.activeCellIndex = open;
-  });
+function pass(notebook) {
+  const open = notebook.widgets.findIndex((cell, at) => at >= notebook.activeCellIndex && !cell.isHidden);
+  if (open > notebook.activeCellIndex) notebook.activeCellIndex = open;
 }
 
 // Open the answer below; return what was found: the answer, or null.
@@ -30,18 +24,15 @@ function right(cell) {
 
 export default {
   render({ model, el }) {
-    guard(window.jupyterapp?.shell.currentWidget?.content);
-    const said = document.createElement("span");
-    said.setAttribute("role", "status");
+    window.jupyterapp?.shell.currentWidget?.content?.activeCellChanged?.connect(pass); // a second time has no effect
+    const make = (tag, settings) => Object.assign(document.createElement(tag), settings);
+    const said = make("span", { role: "status" }), className = "jupyter-widgets jupyter-button widget-button";
     const buttons = model.get("letters").map((letter) => {
-      const button = document.createElement("button");
-      button.className = "jupyter-widgets jupyter-button widget-button";
-      button.style.width = "4em";
-      button.textContent = letter;
+      const button = make("button", { className, style: "width: 4em", textContent: letter });
       button.onclick = () => {
         buttons.forEach((each) => {
           each.classList.toggle("mod-active", each === button);
-          each.setAttribute("aria-pressed", each === button);
+          each.ariaPressed = each === button;
         });
         const answer = open(el);
         setTimeout(() => { // JupyterLab draws the opened cells first
@@ -52,8 +43,7 @@ export default {
       };
       return button;
     });
-    el.setAttribute("role", "group");
-    el.setAttribute("aria-label", "Your vote");
+    Object.assign(el, { role: "group", ariaLabel: "Your vote" });
     el.append(...buttons, said);
   },
 };
