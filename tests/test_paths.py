@@ -20,8 +20,8 @@ TWISTS, BENDS = RNG.normal(size=(2, N, 6))
 H = np.diff(TIMES)
 
 WITHOUT_VELOCITIES = [rb.geodesic, rb.projected_line, rb.screw]
-QUINTICS = [rb.projected_quintic, rb.closed_forms.exponential_quintic]
-LEGS = [*WITHOUT_VELOCITIES, *rb.closed_forms.FORMS.values(), rb.minimum_acceleration, *QUINTICS]
+CUBICS = [rb.projected_cubic, rb.closed_forms.quaternion_cubic]
+LEGS = [*WITHOUT_VELOCITIES, *CUBICS, rb.minimum_acceleration, rb.projected_quintic]
 both_groups = pytest.mark.parametrize("poses", [ROTATIONS, POSES], ids=["3", "4"])
 
 
@@ -43,7 +43,7 @@ def test_a_chain_meets_its_poses(leg, poses):
         with pytest.raises(ValueError, match=r"^leg: start, goal: poses"):
             rb.chain(TIMES, poses, leg=leg)
         return
-    smooth = -1 if leg in WITHOUT_VELOCITIES else 1 + (leg in QUINTICS)
+    smooth = -1 if leg in WITHOUT_VELOCITIES else 1 + (leg is rb.projected_quintic)
     right = (
         poses,
         *(x[:, : 3 if poses is ROTATIONS else 6] for x in (TWISTS, BENDS)[: max(0, smooth)]),
@@ -124,7 +124,7 @@ def test_a_wrong_request_for_a_rest_is_refused(rest_at):
         rb.projected_spline(TIMES, POSES, rest_at=rest_at)
 
 
-@pytest.mark.parametrize("ratio", [1, 100, 1e4])
+@pytest.mark.parametrize("ratio", [1, 1e4])
 def test_uneven_time_steps_lose_no_digits(ratio):
     """At poses and joints, w and w' are accurate to a few eps, relative to ‖w‖ and ‖w‖² + ‖w'‖.
 
@@ -185,7 +185,6 @@ def test_user_defined_functions_make_legs():
 FAR = rb.pose_from_components(ROTATIONS, POSES[:, :3, 3] + [5e5, 5.3e6, 100])
 HALF_TURN = ROTATIONS[:1] @ [np.eye(3), np.diag([1.0, -1, -1])]
 TURNS = partial(rb.geodesic, ROTATIONS[:2], ROTATIONS[1:3])
-MOVES = partial(rb.geodesic, POSES[:2], POSES[1:3])
 heavy = partial(rb.projected_cubic, body=rb.Body(np.stack([np.eye(3), 2 * np.eye(3)])))
 
 
@@ -196,31 +195,20 @@ def turned_by(w):
     )
 
 
+def slow_turns(start, goal, duration):
+    return TURNS(duration=9)
+
+
 @pytest.mark.parametrize(
     ("poses", "leg", "message"),
     [
         (ROTATIONS, rb.exp_so3, "a function that takes start, goal and the keyword duration is"),
         (ROTATIONS, 3, "a function that takes start, goal and the keyword duration is wanted (3"),
         (ROTATIONS, rb.screw, "start, goal: poses, shape (..., 4, 4), are wanted, got rotations"),
-        (
-            ROTATIONS,
-            lambda A, B, duration: None,
-            "a stack of 2 curves of these durations is wanted",
-        ),
-        (
-            ROTATIONS,
-            lambda A, B, duration: TURNS(duration=9),
-            "a stack of 2 curves of these durations",
-        ),
+        (ROTATIONS, slow_turns, "a stack of 2 curves of these durations is wanted"),
         (ROTATIONS, turned_by([[0] * 3, [0, 1, 0]]), "it does not lead from poses[1] to poses[2]"),
         (FAR, turned_by([0, 0, 2e-6]), "it does not lead from poses[0] to poses[1]"),
         (POSES, lambda A, B, **T: TURNS(**T), "curves of shape (4, 4) are wanted, got (3, 3)"),
-        (ROTATIONS, lambda A, B, **T: MOVES(**T), "curves of shape (3, 3) are wanted, got (4, 4)"),
-        (
-            ROTATIONS,
-            lambda A, B, **T: rb.closed_forms.bezier(A, B, [9, 9, 9], **T),
-            "v0[0]: an angle",
-        ),
         (ROTATIONS, lambda A, B, **T: heavy(A, B, **T), "the same body for all legs is wanted"),
     ],
 )
@@ -239,7 +227,6 @@ PATHS = [
     (([0, 1], [-np.eye(3)] * 2), "poses[0] is not a rotation: its determinant is −1"),
     (([0, 1], HALF_TURN), "poses[0] and poses[1] are a half-turn apart: put a pose"),
 ]
-OF_PATHS = resting, rb.bessel_velocities, rb.spline_velocities
 SCREWS = partial(rb.chain, leg=rb.screw)
 LATE = resting([1e9, 2e9], ROTATIONS[:2])
 UNEVEN = rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]).retimed(H)
@@ -248,7 +235,8 @@ UNEVEN = rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]).retimed(H)
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
-        *((function, *path) for function in OF_PATHS for path in PATHS),
+        *((rb.bessel_velocities, *path) for path in PATHS),
+        *((make, *PATHS[0]) for make in (resting, rb.spline_velocities)),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:2, :3]), "velocities: shape (N, 6) is wanted"),
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:3]), "velocities: 2 are wanted, one for each pose"),
         (rb.chain, ([0, 1], POSES[:2]), "velocities: one for each pose is wanted; projected_spl"),
@@ -258,17 +246,14 @@ UNEVEN = rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]).retimed(H)
         (
             rb.chain,
             (TIMES, POSES, TWISTS, BENDS),
-            "leg: a function that takes start, goal, v0, v1, a0, a1 and",
+            "leg: a function that takes start, goal, v0, v1, a0",
         ),
         (LATE, (3.5,), "t is 3.5, a time in [1000000000, 2000000000] is"),
         (UNEVEN.at_own_times, ([0 * H, 9 * np.eye(N - 1)[2]],), "t[1, 2] is 9.0, a time in [0, "),
         (UNEVEN[0].retimed, (0,), "duration is 0.0, a duration from 1e-100"),
         (UNEVEN[0].retimed, ([1, 2],), "duration: a single number or shape"),
         (LATE.retimed, (1e-9,), "duration is 1e-09: it vanishes by rounding when added"),
-        *(
-            (rb.projected_spline, (TIMES, POSES, ends), "ends")
-            for ends in ("free", (TWISTS[0, :3], None), 3)
-        ),
+        (rb.projected_spline, (TIMES, POSES, (TWISTS[0, :3], None)), "ends"),
         (UNEVEN[0].moved, (POSES[0],), "left: shape (3, 3) is wanted, since"),
         (UNEVEN[0].moved, (None, 2 * np.eye(3)), "right is not a rotation"),
         (LATE.moved, (ROTATIONS[:2],), "left: shape (3, 3) is wanted, since"),
@@ -372,24 +357,15 @@ def corners(share):
 @pytest.mark.parametrize(
     ("turn", "path", "message"),
     [
-        *(
-            (turn, np.sin, "rotation: a single curve on SO(3) is wanted, got ")
-            for turn in (UNEVEN, rb.geodesic(*POSES[:2]), ROTATIONS[0])
-        ),
+        (UNEVEN, np.sin, "rotation: a single curve on SO(3) is wanted, got "),
+        (rb.geodesic(*POSES[:2]), np.sin, "rotation: a single curve on SO(3) is wanted, got "),
         (
             rb.fastest(LATE, angular_acceleration=1),
             np.sin,
-            "rotation: it is a Timed; join its path and the position, then call fastest",
+            "rotation: it is a Timed; join its path",
         ),
-        *(
-            (UNEVEN[0], other, "position: a callable position(t, order) is wanted, such as")
-            for other in (POSES[:2, :3, 3], UNEVEN[0])
-        ),
-        (
-            UNEVEN[0],
-            lambda t: np.zeros(3),
-            "position: a callable position(t, order) is wanted, such",
-        ),
+        (UNEVEN[0], UNEVEN[0], "position: a callable position(t, order) is wanted, such as"),
+        (UNEVEN[0], lambda t: np.zeros(3), "position: a callable position(t, order) is wanted"),
         (UNEVEN[0], corners(1), "position: its velocity jumps at t = "),
         (UNEVEN[0], corners(0.5), "position: its knots from 0.0 to "),
         (UNEVEN[0], lambda t, k: np.zeros(3), "position(t, 0): shape (1, 3) is wanted, got (3,)"),
