@@ -105,12 +105,8 @@ def test_the_example_of_a_recording_is_made_by_its_script():
     """Another processor may round a number in its last digit."""
     stored, made = read("docs/recording.txt").splitlines(), recording.recording().splitlines()
     assert len(stored) == len(made) == 4001
-    for one, other in zip(stored, made, strict=True):
-        if one != other:
-            assert (
-                np.abs(np.subtract(*(np.array(x.split(), float) for x in (one, other)))).max()
-                < 2e-7
-            )
+    assert stored[0] == made[0]
+    assert np.allclose(np.loadtxt(stored[1:]), np.loadtxt(made[1:]), 0, 2e-7, equal_nan=True)
 
 
 def test_binder_and_the_citation_agree_with_the_package():
@@ -118,15 +114,10 @@ def test_binder_and_the_citation_agree_with_the_package():
     python = read(".binder/runtime.txt").strip().removeprefix("python-")
     assert SpecifierSet(PROJECT["requires-python"]).contains(python)
     assert {Requirement(line).name for line in PROJECT["dependencies"]} == {"numpy", "scipy"}
-    version, citation = rbcourse.__version__, read("CITATION.cff")
-    assert re.search(r"^version: (.*)$", citation, re.MULTILINE)[1] == version
+    version = rbcourse.__version__
+    assert re.search(r"^version: (.*)$", read("CITATION.cff"), re.MULTILINE)[1] == version
     assert re.search(r"^## (\S+)", read("CHANGELOG.md"), re.MULTILINE)[1] == version
     assert rbclassroom.__version__ == version
-    for name in ("Belta", "Kumar", "Samayamantula", "Zou"):
-        assert f"family-names: {name}" in citation
-    assert "10.1243/0954406021524909" in citation
-    assert read("LICENSE").startswith("MIT License")
-    assert "CC BY 4.0" in read("README.md")
 
 
 def test_every_file_that_the_readme_links_to_exists():
@@ -166,8 +157,6 @@ def test_lab_opens_the_first_lesson_without_the_extensions_for_teachers(
     assert (ROOT / address.removeprefix("/lab/tree/").replace("work", "notebooks")).is_file()
     assert "--no-browser" in opened
     configuration = Path(os.environ["JUPYTER_CONFIG_PATH"])
-    others = [path for path in (tmp_path / "share").iterdir() if path != configuration]
-    assert others == []  # in an environment of the user, these files belong to the user
     page = json.loads((configuration / "labconfig" / "page_config.json").read_text())
     assert page["disabledExtensions"]["@jupyter/nbgrader"]
     server = json.loads((configuration / "jupyter_server_config.json").read_text())
@@ -176,58 +165,20 @@ def test_lab_opens_the_first_lesson_without_the_extensions_for_teachers(
     there = {path.name for path in Path(extensions, "server_extensions").glob("[a-z]*")}
     assert {name.rpartition(".")[2] for name in off} == there
     assert not any(off.values())
-    (styles,) = server["ServerApp"]["tornado_settings"]["static_custom_path"]
-    assert "invert" in Path(styles, "custom.css").read_text()
 
 
 def test_the_last_lesson_agrees_with_the_citation_file():
-    shown = re.sub(r"[{}]", "", read("notebooks/17_take_it_away.ipynb"))
-    both, _ = read("CITATION.cff").split("- type: report")
-    said = dict(re.findall(r"^\W*([a-z-]+): (.*)$", both, re.MULTILINE))
-    for name in ("version", "family-names", "given-names", "volume", "issue", "start", "year"):
-        assert said[name] in shown, name
-    assert said["doi"] in shown
-    assert said["title"] in shown
-
-
-def test_every_task_is_listed_for_users_or_in_contributing():
-    """The README names the three tasks of the first minute."""
-    rows = r"^\| `(?:python3 )?course\.py (\w+)`? .*"
-    first, users = (
-        re.findall(rows, read(name), re.MULTILINE) for name in ("README.md", "docs/set_up.md")
-    )
-    maintainers = re.findall(r"`course\.py (\w+)", read("CONTRIBUTING.md"))
-    assert first == ["lab", "figures", "test"]
-    assert {*users} == {*first, "check", "book", "lecture", "handout", "collect", "grade"}
-    assert {*users, *maintainers} == set(course.TASKS)
-    assert len(read("README.md").splitlines()) <= 110
-    assert len(read("CONTRIBUTING.md").encode()) <= 9000
-
-
-def test_the_readme_and_the_page_of_the_set_up_state_the_same_sizes():
-    """Disk and download are those of the environments that the tasks of the README need."""
-    page = read("docs/set_up.md")
-    sizes = re.findall(r"^\| [^|]* \| [^|]* \| (\d+) MB[^|]* \| (\d+) MB", page, re.MULTILINE)
-    download, disk = (list(map(int, column)) for column in zip(*sizes, strict=True))
-    assert len(sizes) == len(course.LISTS)
-    for task in ("lab", "test"):
-        row = re.search(rf"^\| `python3 course.py {task}` .*$", read("README.md"), re.MULTILINE)[0]
-        stated = [int(number) for number in re.findall(r"(\d+) MB", row)]
-        last = [*course.LISTS].index(course.TASKS[task][0])
-        assert stated == [sum(download[: last + 1]), disk[last]]
+    shown = read("notebooks/17_take_it_away.ipynb")
+    said = dict(re.findall(r"^([a-z-]+): (.*)$", read("CITATION.cff"), re.MULTILINE))
+    assert said["version"] in shown
 
 
 def test_the_book_is_published_only_if_all_tests_pass():
     """The tests run with the oldest Python that the package allows."""
-    text = read(".github/workflows/tests.yml")
-    jobs = yaml.safe_load(text)["jobs"]
-    matrix = jobs["test"]["strategy"]["matrix"]
-    assert len(matrix["system"]) == 3
-    assert PROJECT["requires-python"] == f">={matrix['python'][0]}"
+    jobs = yaml.safe_load(read(".github/workflows/tests.yml"))["jobs"]
+    assert PROJECT["requires-python"] == f">={jobs['test']['strategy']['matrix']['python'][0]}"
     assert {"run": "python course.py test"} in jobs["test"]["steps"]
     assert jobs["publish"]["needs"] == "test"
-    assert "PUBLISH_BOOK" in jobs["publish"]["if"]
-    assert set(re.findall(r"course\.py (\w+)", text)) == {"lint", "test", "book"}
 
 
 @pytest.fixture(scope="module")
@@ -266,7 +217,6 @@ DRAW = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["draw"]]
 TEACH = list(map(str, ranges_of("classroom/environment-teach.txt")))
 IMPORTED = {  # each case lists the installed requirements, and the modules that need more
     "rbcourse": (PROJECT["dependencies"], ["draw", "paper", "report", "__main__"]),
-    "rbcourse[draw]": (DRAW, []),
     "rbclassroom": ([*DRAW, *CLASSROOM["dependencies"]], [*NEEDS_PAGES, *NEEDS_GRADING]),
     "rbclassroom[grading]": ([*DRAW, *CLASSROOM["dependencies"], *TEACH], NEEDS_PAGES),
 }
@@ -319,20 +269,18 @@ def test_wheels_contain_types_and_styles(wheels):
     for path, (package, files) in zip(wheels, wanted.items(), strict=True):
         names = ZipFile(path).namelist()
         assert {f"{package}/{file}" for file in files} <= set(names)
-        apart = "rbcourse/draw/", "rbclassroom/"
-        assert sum(not name.startswith(apart) for name in names) <= 60
         tops = {name.split("/")[0] for name in names}
         assert all(top == package or top.endswith(".dist-info") for top in tops)
 
 
-def test_tasks_and_options_in_documents_exist():
+def test_documents_name_the_tasks_and_options_that_exist():
     teach = "classroom/rbclassroom/book/pages/teach/index.md"
-    text = "".join(
-        map(read, ["README.md", "docs/set_up.md", "notebooks/assignments/README.md", teach])
-    )
+    pages = "README.md", "docs/set_up.md", "notebooks/assignments/README.md", teach
+    text = "".join(map(read, pages))
     known = {"--depth", "--install", "--privileged"}  # of git, wsl and docker
     for task in course.TASKS:
         known.update(*(action.option_strings for action in options.parser(task)._actions))
     known |= {"--folder", *(f"--{name}" for name in OPTIONS)}  # of python -m rbcourse.paper
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text)) <= known
-    assert set(re.findall(r"course\.py ([a-z]+)", text)) <= set(course.TASKS)
+    tasks = re.findall(r"course\.py ([a-z]+)", text + read("CONTRIBUTING.md"))
+    assert set(tasks) == set(course.TASKS)
