@@ -21,7 +21,7 @@ def drawn(columns, **settings):
     return fig, axes
 
 
-@pytest.mark.parametrize("columns", [1, 2, 3, 4])
+@pytest.mark.parametrize("columns", [1, 3])
 def test_cuts_are_between_the_columns_of_axes_with_their_names(columns):
     fig, axes = drawn(columns)
     cuts = np.array(cuts_of(fig)) * fig.bbox.width
@@ -29,7 +29,6 @@ def test_cuts_are_between_the_columns_of_axes_with_their_names(columns):
     assert len(cuts) == columns - 1
     for k, cut in enumerate(cuts):
         assert max(box.x1 for box in boxes[k]) < cut < min(box.x0 for box in boxes[k + 1])
-    plt.close(fig)
 
 
 def test_a_bar_of_colours_stays_with_its_axes():
@@ -38,20 +37,14 @@ def test_a_bar_of_colours_stays_with_its_axes():
     as_png(fig)
     (cut,) = np.array(cuts_of(fig)) * fig.bbox.width
     assert fig.axes[-1].get_tightbbox().x1 < cut < axes[0, 1].get_tightbbox().x0
-    plt.close(fig)
 
 
-def test_columns_that_share_their_numbers_stay_together():
+def test_shared_numbers_and_titles_are_not_divided():
     fig, axes = drawn(2)
     axes[0, 1].tick_params(labelleft=False)
     assert cuts_of(fig) == []
-    plt.close(fig)
-
-
-def test_no_cut_goes_through_a_text():
     fig, _ = drawn(2, suptitle="A title of the whole figure, which is above both columns")
     assert cuts_of(fig) == []
-    plt.close(fig)
 
 
 def test_the_picture_keeps_the_cuts():
@@ -59,4 +52,3 @@ def test_the_picture_keeps_the_cuts():
     with Image.open(io.BytesIO(as_png(fig))) as picture:
         found = np.array(picture.info["cuts"].split(), float)
     assert np.abs(found - cuts_of(fig)).max() <= 0.0005 + 1e-12
-    plt.close(fig)

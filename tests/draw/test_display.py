@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from matplotlib.patches import Annulus, Rectangle
+from matplotlib.patches import Rectangle
 
 import rbcourse as rb
 from rbclassroom.course.agreement import polygons, split
@@ -22,53 +22,6 @@ def recorded(ax, *artists):
     display = Display(ax.figure)
     (state,) = split(joined([display.record(artists)]))
     return polygons(state, list(display.styles))
-
-
-def test_a_line_is_recorded_with_its_places_and_its_style(ax):
-    (line,) = ax.plot([0, 0.5, 1], [0, 1, 0.25], color="#ff8000", lw=3.6, ls=(0, (2, 1)))
-    ((style, more, places),) = recorded(ax, line)
-    assert np.abs(places - [[0, 200], [150, 0], [300, 150]]).max() <= 0.5 / PARTS
-    assert style[:3] == (None, "#ff8000ff", 5.0)
-    assert style[3] == (10.0, 5.0)  # in units of the line width
-    assert style[4:] == ("butt", "round", (0, 0, 300, 200), ())
-    assert not more
-
-
-def test_patches_keep_their_colours_and_holes(ax):
-    patch = ax.add_patch(Rectangle((0.1, 0.25), 0.5, 0.5, fc=(0, 0, 1, 0.5), ec="black", lw=0))
-    ring = ax.add_patch(Annulus((0.5, 0.5), 0.4, 0.2))
-    (style, _, places), outer, inner = recorded(ax, patch, ring)
-    corners = {tuple(place) for place in np.round(places)}
-    assert corners == {(30, 150), (180, 150), (180, 50), (30, 50)}
-    assert style[:3] == ("#0000ff80", None, 0)
-    assert (outer[1], inner[1]) == (False, True)
-    assert inner[0] == outer[0]
-    for (_, _, places), radius in ((outer, 0.4), (inner, 0.2)):
-        assert np.ptp(places[:, 0]) == pytest.approx(2 * 300 * radius, abs=1)
-
-
-def test_each_state_has_its_own_polygons(ax):
-    (line,) = ax.plot([], [])
-    display, states = Display(ax.figure), []
-    for x in (0.2, np.nan, 0.6):
-        line.set_data([x, x], [0, 1])
-        states.append(display.record([line]))
-    first, none, last = (polygons(state, list(display.styles)) for state in split(joined(states)))
-    assert none == []
-    for ((_, _, places),), x in ((first, 60), (last, 180)):
-        assert np.abs(places[:, 0] - x).max() <= 1
-    assert first[0][0] == last[0][0]
-    assert len(display.styles) == 1
-
-
-def test_a_marker_is_stored_once_and_drawn_at_each_point(ax):
-    (dots,) = ax.plot([0.1, np.nan, 0.5], [0.5, 0.5, 1], "s", ms=7.2, mew=0, color="#0000ff")
-    ((style, _, places),) = recorded(ax, dots)
-    assert np.abs(places - [[30, 100], [150, 0]]).max() <= 0.5 / PARTS
-    assert style[:2] == ("#0000ffff", None)
-    (marker,) = style[7]
-    square = np.reshape(marker, (-1, 2)).cumsum(axis=0) / PARTS
-    assert np.abs(np.abs(square) - 5).max() <= 1 / PARTS
 
 
 @pytest.mark.parametrize("width", [3, 15])
