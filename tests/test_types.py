@@ -11,9 +11,7 @@ MISTAKES = {
     "c(0.5, 4)": '"Literal[4]"',
     'rb.projected_spline([0, 1], poses, "rests")': "\"Literal['rests']\"",
     "rb.fastest(c, speeds=1)": 'Unexpected keyword argument "speeds"',
-    "rb.limits_used(c, forces=1)": 'Unexpected keyword argument "forces"',
     'limits: rb.Limits = {"aceleration": 2}': 'Extra key "aceleration"',
-    "rb.minimum_acceleration(np.eye(3), np.eye(3), body=2.0)": 'expected "Body | None"',
     "rb.geodesic_so3": 'no attribute "geodesic_so3"',
 }
 
