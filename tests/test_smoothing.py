@@ -2,22 +2,17 @@
 
 import re
 import warnings
-from dataclasses import replace
-from pathlib import Path
 from textwrap import dedent
 
 import numpy as np
 import pytest
-import recording
 from scipy.interpolate import CubicHermiteSpline, make_smoothing_spline
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse.curves.smoothing import Smoother, checked_problem, closed_form
+from rbcourse.curves.smoothing import Smoother
 from rbcourse.optimum import minimum_acceleration_smoothing
-from rbcourse.optimum._spline import responses_of
-from rbcourse.optimum.smoothing import _Problem
 
 RNG = np.random.default_rng(79)
 T = np.cumsum(RNG.uniform(0.5, 1.5, 40))
@@ -168,7 +163,7 @@ def test_rotations_about_one_axis_follow_the_spline_of_the_angle(make, bounds):
 
 def test_the_noise_is_found_and_reduced():
     t, ratios, found = np.arange(120.0), [], []
-    for seed in range(6):
+    for seed in range(3):
         R, measured = wandering(t, 0.05, 0.03, seed)
         for options in ({}, {"noise": 0.03}):
             c = rb.smoothing_spline(t, measured, **options)
@@ -189,19 +184,6 @@ def test_a_short_period_interpolates_and_a_long_one_gives_a_steady_turn():
     c = rb.smoothing_spline(T, measured, period=500)
     assert np.abs(c(FINE, 2)).max() < 1e-7
     assert np.abs(c(T) - steady).max() < 1e-3
-
-
-def test_the_fastest_motion_along_a_noisy_recording_takes_hardly_longer():
-    """Without smoothing, it takes 22 times as long."""
-    file = Path(recording.__file__).with_suffix(".txt")
-    times, poses, _ = rb.read_path(file, start="first", skip="nan")
-    t = np.linspace(0, 20, 401)
-    clean = rb.projected_spline(t, recording.true_path(t), "rest")
-    smooth = rb.smoothing_spline(times, poses, "rest")
-    assert smooth.noise == pytest.approx([1e-4, 1e-4], rel=0.02)
-    limits = {"angular_speed": 1.5, "angular_acceleration": 6, "speed": 0.7, "acceleration": 3}
-    least, found = (rb.fastest(c, **limits).domain[1] for c in (clean, smooth))
-    assert least < found < 1.05 * least
 
 
 def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
@@ -287,42 +269,6 @@ def test_the_costate_of_the_optimum_jumps_by_the_pull_of_the_measurement():
         assert c.cost == pytest.approx(rb.acceleration_cost(c), rel=1e-10)
 
 
-def _sum(knots, w, problem, smoothing):
-    """Return Σ wᵢ (3 − tr RᵢᵀR) + λ ∫ ‖w'‖² dt with optima between the knots."""
-    c = rb.minimum_acceleration(knots[:-1], knots[1:], w[:-1], w[1:], duration=problem.h)
-    far = 3 * problem.smoother.weights.sum() / problem.smoother.total.mean()
-    return far - np.sum(problem.D * knots) + smoothing * np.sum(c.cost) / 2
-
-
-def test_the_linear_system_has_the_derivatives_of_the_sum():
-    """The changes of the sum by ± turns and velocities are odd and even in the change."""
-    R, smoothing, step = wandering(T[:6], 0.5, 0.3)[1], 0.7, 1e-4
-    _, smoother, *_ = checked_problem(T[:6], R, "natural", None, None, W[:6])
-    problem = _Problem.of(smoother, R, "natural")
-    curve = closed_form(smoother, R, None, smoother.period(smoothing))
-    legs = rb.minimum_acceleration(
-        *(curve(T[i]) for i in (slice(5), slice(1, 6))),
-        *(curve(T[i], 1) for i in (slice(5), slice(1, 6))),
-        duration=np.diff(T[:6]),
-    )
-    state = problem.start(replace(curve, legs=legs))
-    now = problem.legs(state)
-    system = problem.system(state, now, responses_of(now), smoothing)
-    knots = state.knots
-    for change in np.random.default_rng(7).normal(size=(3, 6, 6)):
-        turn, dw = change[:, :3], change[:, 3:]
-        up, mid, down = (
-            _sum(rb.exp_so3(x * turn) @ knots, state.w + x * dw, problem, smoothing)
-            for x in (step, 0, -step)
-        )
-        x, y = change[:-1], change[1:]
-        slope = -np.sum(system.b0 * x) - np.sum(system.b1 * y)
-        bend = np.einsum("ia,iab,ib", x, system.A, x) + np.einsum("ia,iab,ib", y, system.D, y)
-        bend += 2 * np.einsum("ia,iab,ib", x, system.B, y)
-        assert (up - down) / (2 * step) == pytest.approx(slope, rel=1e-4)
-        assert (up - 2 * mid + down) / step**2 == pytest.approx(bend, rel=1e-4)
-
-
 def test_the_optimum_ranges_from_the_interpolating_one_to_the_best_steady_turn():
     t, R = T[:8], wandering(T[:8], 0.4, 0.1)[1]
     tight = minimum_acceleration_smoothing(t, R, period=1e-2)
@@ -396,13 +342,13 @@ def test_an_optimum_that_is_not_found_raises_an_error():
         minimum_acceleration_smoothing(np.arange(12), R, period=100)
 
 
-@pytest.mark.parametrize("gap", [1e-9, 1e-7, 1e-5, 5e-4])
+@pytest.mark.parametrize("gap", [1e-9, 5e-4])
 def test_poses_at_nearly_equal_times_are_averaged(gap):
     """The gap is in steps; two sensors on one clock give such times."""
-    t = 0.05 * np.arange(200)
+    t = 0.05 * np.arange(80)
     R = rb.exp_so3(np.stack([np.sin(t), np.cos(t), 0 * t], axis=1))
-    R = R @ rb.exp_so3(0.01 * np.random.default_rng(0).normal(size=(200, 3)))
-    t[100] = t[99]
+    R = R @ rb.exp_so3(0.01 * np.random.default_rng(0).normal(size=(80, 3)))
+    t[40] = t[39]
     for again in (t, np.repeat(t[::2], 2)):
         close = again + 0.05 * gap * (np.append(1, np.diff(again)) == 0)
         for smooth in (rb.smoothing_spline, rb.optimum.minimum_acceleration_smoothing):

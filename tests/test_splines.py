@@ -6,10 +6,8 @@ from functools import partial
 import numpy as np
 import oracles
 import pytest
-from numpy.polynomial import Chebyshev, Polynomial
 from optima import BOOK, deviation
-from scipy.interpolate import BPoly, CubicSpline
-from scipy.optimize import least_squares
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 import rbcourse as rb
@@ -59,7 +57,7 @@ def off(x, size):
 
 
 @every_spline
-@pytest.mark.parametrize("degrees", [10, 60, 110])
+@pytest.mark.parametrize("degrees", [10, 110])
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
 def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
     """The acceleration is 0 at natural ends and equal at periodic ends. The same holds for the
@@ -177,58 +175,12 @@ def test_the_optimum_agrees_with_the_textbook():
         assert off(c(t, 2) - a, a) < 1e-7
 
 
-def least_cost(t, R, bodies):
-    """Return the least cost of quaternions (p + v)/‖p + v‖, where p is the cubic of the ends, and
-    v is a vector of higher degree. The velocities at the rotations are free, and no
-    Euler–Lagrange equation is used."""
-    h, count, free = np.diff(t), len(R), 9
-    x, weight = np.polynomial.legendre.leggauss(30)
-    s = (x + 1) / 2
-    hermite = BPoly.from_derivatives([0, 1], np.eye(4).reshape(2, 2, 4))
-    bump = Polynomial([0, 0, 1, -2, 1])
-    bumps = [bump * Chebyshev.basis(k, [0, 1]).convert(kind=Polynomial) for k in range(free)]
-    last = Rotation.from_matrix(R[:-1].mT @ R[1:]).as_quat(canonical=True, scalar_first=True)
-    start = [np.tile([1.0, 0, 0, 0], (count - 1, 1)), last]
-
-    def rate_of(q, w):
-        half = np.insert(w * h[:, None] / 2, 0, 0, axis=1)
-        return np.stack(oracles.quaternion_product(q.T, half.T), axis=-1)
-
-    def residuals(x):
-        w, v = x[: 3 * count].reshape(count, 3), x[3 * count :].reshape(count - 1, free, 3)
-        rates = [rate_of(q, y) for q, y in zip(start, (w[:-1], w[1:]), strict=True)]
-        ends, c = np.stack([start[0], rates[0], last, rates[1]], axis=1), np.insert(v, 0, 0, -1)
-        jets = (np.stack([b.deriv(k)(s) for b in bumps], axis=-1) @ c for k in range(3))
-        P, P1, P2 = (hermite(s, k) @ ends + jet for k, jet in enumerate(jets))
-        N = np.sum(P * P, axis=-1, keepdims=True)
-        w = 2 * vector(P, P1) / N
-        a = 2 * vector(P, P2) / N - 2 * np.sum(P * P1, axis=-1, keepdims=True) / N * w
-        u = (a @ BOOK + np.cross(w, w @ BOOK)) / np.sqrt(2) if bodies else a
-        return (np.sqrt(weight)[:, None] * u / h[:, None, None] ** 1.5).ravel()
-
-    first = np.append(textbook.spline_velocities(t, R).ravel(), np.zeros(3 * free * (count - 1)))
-    tolerances = dict.fromkeys(("xtol", "ftol", "gtol"), 1e-15)
-    return 2 * least_squares(residuals, first, jac="cs", **tolerances).cost
-
-
-def vector(p, q):
-    """Return the vector part of p̄ q."""
-    return p[..., :1] * q[..., 1:] - q[..., :1] * p[..., 1:] - np.cross(p[..., 1:], q[..., 1:])
-
-
-@pytest.mark.parametrize("bodies", [False, True])
-def test_direct_minimisation_finds_no_lower_cost(bodies):
-    t, R = path(4, 40, 9, ratio=1.5)
-    make = NATURAL["torque" if bodies else "optimum"]
-    assert least_cost(t, R, bodies) == pytest.approx(make(t, R).cost, rel=1e-9, abs=0)
-
-
 @pytest.mark.parametrize(("degrees", "ratio"), [(30, 10), (60, 2), (90, 10), (120, 2)])
 def test_no_other_spline_costs_less_than_the_optimum(degrees, ratio):
     """All splines have the same ends. A chain whose velocities come from parabolas costs a tenth to
     a third more than the optimum."""
     chains = []
-    for seed in range(12):
+    for seed in range(6):
         t, R = path(10, degrees, [10, seed], ratio)
         spline = RotationSpline(t - t[0], Rotation.from_matrix(R))
         ends = spline([0, t[-1] - t[0]], 1)
@@ -249,7 +201,7 @@ def test_no_other_spline_costs_less_than_the_optimum(degrees, ratio):
     assert np.median(chains) > 1.05
 
 
-@pytest.mark.parametrize("seed", [2, 3, 9])
+@pytest.mark.parametrize("seed", [3, 9])
 @pytest.mark.parametrize("ends", ["natural", "periodic"])
 def test_splines_of_large_turns_at_uneven_times_are_found(ends, seed):
     """In these problems, plain Newton's method meets systems that are not positive definite."""
@@ -373,18 +325,6 @@ def test_bad_choices_of_the_long_way_are_refused(long):
         rb.minimum_acceleration_spline(*path(3, 50, 16), long=long)
 
 
-def test_very_uneven_times_give_a_minimum_or_an_error():
-    """The short legs last a thousandth as long as the other legs, but turn by the same angle."""
-    t = np.array([0, 1, 1.001, 2, 2.001, 3])
-    _, R = path(6, 150, 17)
-    try:
-        c = rb.minimum_acceleration_spline(t, R)
-    except rb.optimum.ConvergenceError:
-        return
-    assert c.definite
-    assert off(c.jumps(2), c(t, 2)) < 1e-9
-
-
 def test_a_failure_names_the_times():
     R = rb.sample_rotation(4, rng=1)
     with pytest.raises(rb.optimum.ConvergenceError, match="the times between them too different"):
@@ -402,7 +342,7 @@ def test_nearly_equal_times_are_refused(name):
     assert np.abs(NATURAL[name](t, R).jumps(2)).max() < 1e-6
 
 
-@pytest.mark.parametrize("size", [0, 1e-13, 1e-9, 1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("size", [0, 1e-13, 1e-7, 1e-3])
 @every_spline
 def test_a_spline_of_tiny_turns_is_the_cubic_spline_of_rotation_vectors(name, size):
     """A gripper that keeps its orientation has the size 0; the legs have different durations."""

