@@ -336,17 +336,17 @@ def test_the_times_of_legs_between_stops_do_not_matter():
 
 
 def test_a_recording_needs_little_memory():
-    t, poses = recording(0, 400)
+    t, poses = recording(0, 1000)
     path = spline(t, poses)
     tracemalloc.start()
     timed = rb.fastest(path, **NORMS)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 400 * 20e3
-    assert len(timed.s) < 6 * 400
+    assert peak < 1000 * 20e3
+    assert len(timed.s) < 6 * 1000
     with mock.patch.object(_cells, "_check_memory", wraps=_cells._check_memory) as checked:
         rb.fastest(path, acceleration=1, angular_acceleration=1)
-    assert checked.call_args.args[0] == pytest.approx(4 * 400, rel=0.1)
+    assert checked.call_args.args[0] == pytest.approx(4 * 1000, rel=0.1)
     with pytest.raises(MemoryError, match="divide the path"):
         _cells._check_memory(10**13)
 
