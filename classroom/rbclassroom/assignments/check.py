@@ -21,10 +21,10 @@ from rbclassroom.assignments import locked_cells
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test, name_cell
 from rbclassroom.assignments.my_motion import FILE, find, keep
 from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient, without_number
-from rbclassroom.assignments.safe_files import write_whole
 from rbclassroom.assignments.submissions import count_found, read_notebook, restore
 from rbclassroom.course import options
 from rbclassroom.course.notebooks import KERNEL
+from rbcourse.files import replace_file
 
 HANDED = "to_submit"
 """The folder of the file to hand in, beside the notebook."""
@@ -58,17 +58,21 @@ def check(path: Path, seconds: int = CELL_SECONDS) -> Path:
     print(f"cell numbers count all cells, {where}")
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as own:
-        Path(own, "work").mkdir()
+        work = Path(own, "work")
+        work.mkdir()
         for file, content in files.items():
-            write_whole(Path(own, "work", file), content)
+            (work / file).parent.mkdir(parents=True, exist_ok=True)
+            replace_file(work / file, content)
         if (mine := find(path.parent, Path(name).stem)).is_file():
-            write_whole(Path(own, FILE), mine.read_bytes())
+            replace_file(Path(own, FILE), mine.read_bytes())
         remarks += _run(notebook, Path(own), seconds)
     print("".join(f"- {what}\n" for what in remarks), end="")
     passed = _print_problems(notebook, original)
     nbformat.validate(notebook)
     content = (nbformat.writes(notebook) + "\n").encode()
-    target = write_whole(path.parent / HANDED / name, content)
+    target = path.parent / HANDED / name
+    target.parent.mkdir(exist_ok=True)
+    replace_file(target, content)
     print(f"{sum(passed)} of {len(passed)} visible tests passed; hidden tests run in grading")
     stem = name.removesuffix(".ipynb")
     _keep(notebook, stem, files.get(f"{stem}.json", b"{}"), path.parent)
@@ -117,8 +121,8 @@ def _keep(notebook: NotebookNode, name: str, data: bytes, folder: Path) -> None:
         new, said = keep(text, name, data.decode(), own, passed)
         if new != text:
             if text:
-                write_whole(mine.with_suffix(".before.py"), text.encode())
-            write_whole(mine, new.encode())
+                replace_file(mine.with_suffix(".before.py"), text.encode())
+            replace_file(mine, new.encode())
     except (OSError, ValueError) as error:
         said = f"{FILE} is not changed: {error}"
     if said:

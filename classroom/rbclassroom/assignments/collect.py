@@ -19,8 +19,8 @@ import nbformat
 from nbformat import NotebookNode
 
 from rbclassroom.assignments.downloads import File, find_files, find_owners, written
-from rbclassroom.assignments.safe_files import write_csv, write_whole
 from rbclassroom.assignments.submissions import count_found, read_notebook
+from rbcourse.files import replace_file
 
 LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
 LISTS += ["nothing usable", "not on the roster", "missing"]
@@ -69,14 +69,19 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         if roster and who not in ids:
             rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
     names = sorted({name for name, *_ in groups})
-    rows += _missing(names, roster, submitted)
+    for name in names:
+        for row in roster:
+            if not (submitted / row["id"] / name / f"{name}.ipynb").exists():
+                who = f"{row.get('first_name', '')} {row.get('last_name', '')}".strip()
+                rows.append(("missing", f"{row['id']}, {name}", who))
     # before there was a roster, the label was made from the name and the number
     students = {*labels, *(f"{name} {number}".strip() for number, name in labels.values())}
     before = [row for row in read_report(assignments) if _still_holds(row, names, students)]
     now = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
     lines = [*before, *(row | {"sets": " ".join(names)} for row in now)]
     owners |= {what: labels[what] for kind, what, _ in rows if kind == "nothing usable"}
-    write_whole(submitted / "owners.json", json.dumps(owners).encode())
+    submitted.mkdir(exist_ok=True)
+    replace_file(submitted / "owners.json", json.dumps(owners).encode())
     write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": "", "sets": ""}])
     return rows
 
@@ -110,20 +115,25 @@ def _grouped(
     files, rows, labels = list(find_files(folder)), list[Row](), dict[str, Owner]()
     found = ["" if file.kind else _set_of(file, sets) for file in files]
     for file, name, about in zip(files, found, find_owners(files, found), strict=True):
-        if about:
-            labels[_label(about, roster)] = about["id"], about["name"]
-        why = "neither its name nor a folder names a student"
-        why = file.why or (_mismatch(name, about, sets) if about else why)
-        if about and not why:
-            prepared = "/to_submit/" in f"/{about['file']}"
-            place, first = (about["date"], prepared, file.label), int(about["number"] or 0)
-            upload = Upload(first, *place, about, file.content)
+        if not about:
+            why = file.why or "neither its name nor a folder names a student"
+            rows.append((file.kind or "unmatched", file.label, why))
+            continue
+        label = _label(about, roster)
+        labels[label] = about["id"], about["name"]
+        named = _named(Path(about["file"]).stem, sets)
+        if file.kind or not name:
+            why = file.why or "it is not a notebook of a handout"
+        elif named and name not in named:
+            why = f"its name is {named[0]}, its cells are of {name}"
+        else:
+            prepared, first = "/to_submit/" in f"/{about['file']}", int(about["number"] or 0)
+            upload = Upload(first, about["date"], prepared, file.label, about, file.content)
             number = about["id"] or about["folder"] or about["name"]
             groups[name, _student(about, roster), number].append(upload)
             continue
         rows.append((file.kind or "unmatched", file.label, why))
-        if about:
-            unused[_label(about, roster)].append(f"{file.label}: {why}")
+        unused[label].append(f"{file.label}: {why}")
     for uploads in groups.values():
         unused.pop(_label(uploads[0].about, roster), None)
         uploads.sort(key=lambda upload: upload[:4])
@@ -154,12 +164,18 @@ def _folder_of(
 
 
 def _renamed(key: str, owner: Owner, owners: dict[str, Owner], submitted: Path) -> Iterator[Row]:
-    """Move a student's files that were collected under another name to ``student/set``."""
-    name = key.rpartition("/")[2]
-    for old in [old for old, known in owners.items() if owner[0] and known == owner]:
-        if old.endswith(f"/{name}") and old != key:
-            yield _move(submitted / old, submitted / key)
-            del owners[old]
+    """Move files that were collected before the student was on the roster to ``student/set``."""
+    who, _, name = key.rpartition("/")
+    same = [old for old, known in owners.items() if owner[0] and known == owner and old != key]
+    for old in (old for old in same if old.endswith(f"/{name}")):
+        del owners[old]
+        if (submitted / key).exists() or not (submitted / old).exists():
+            why = f"the same student as {who}, {name}; delete this folder if it is there"
+            yield "duplicates", f"submitted/{old}", why
+            continue
+        (submitted / who).mkdir(exist_ok=True)
+        (submitted / old).rename(submitted / key)
+        yield "renamed", f"submitted/{old}", f"is {who}, {name}"
 
 
 def _why_late(best: Upload, due: datetime | None) -> str:
@@ -173,31 +189,11 @@ def _why_late(best: Upload, due: datetime | None) -> str:
     return f"perhaps: {best.date} may be the date of the download; look in Moodle"
 
 
-def _missing(names: list[str], roster: list[dict[str, str]], submitted: Path) -> Iterator[Row]:
-    """Yield a row for each student on the roster without a file for a collected set."""
-    for name in names:
-        for row in roster:
-            if not (submitted / row["id"] / name / f"{name}.ipynb").exists():
-                words = f"{row.get('first_name', '')} {row.get('last_name', '')}".strip()
-                yield "missing", f"{row['id']}, {name}", words
-
-
 def read_owners(assignments: Path) -> dict[str, Owner]:
     """Return the number and the name in the LMS of each ``student/set`` that was collected."""
     stored = assignments / "submitted" / "owners.json"
     known = json.loads(stored.read_text("utf-8")) if stored.exists() else {}
-    return {key: (who, "") if isinstance(who, str) else tuple(who) for key, who in known.items()}
-
-
-def _move(old: Path, new: Path) -> Row:
-    """Move a folder that was collected before the student was on the roster."""
-    who = f"{new.parent.name}, {new.name}"
-    if new.exists() or not old.exists():
-        why = f"the same student as {who}; delete this folder if it is there"
-        return "duplicates", f"submitted/{old.parent.name}/{old.name}", why
-    new.parent.mkdir(parents=True, exist_ok=True)
-    old.rename(new)
-    return "renamed", f"submitted/{old.parent.name}/{old.name}", f"is {who}"
+    return {key: (number, name) for key, (number, name) in known.items()}
 
 
 def _label(about: dict[str, str], roster: list[dict[str, str]]) -> str:
@@ -248,14 +244,6 @@ def _named(name: str, sets: Iterable[str]) -> list[str]:
     return [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", name, re.IGNORECASE)]
 
 
-def _mismatch(name: str, about: dict[str, str], sets: Iterable[str]) -> str:
-    """Return why a notebook is not used for the set that its cells belong to, or ""."""
-    named = _named(Path(about["file"]).stem, sets)
-    if not name:
-        return "it is not a notebook of a handout"
-    return f"its name is {named[0]}, its cells are of {name}" if named and name not in named else ""
-
-
 def _plain(name: str) -> str:
     """Return a name in lower case without apostrophes, which Moodle removes."""
     name = re.sub("['`’]", "", unicodedata.normalize("NFKC", name).casefold())
@@ -290,6 +278,19 @@ def _take(best: Upload, place: Path) -> Row:
         if best.date < old:
             return "duplicates", best.file, f"{why}: the file collected before is newer"
         why += ": it replaces the file collected before"
-    write_whole(target, best.content)
-    write_whole(stamp, f"{best.date}\n".encode())
+    place.mkdir(parents=True, exist_ok=True)
+    replace_file(target, best.content)
+    replace_file(stamp, f"{best.date}\n".encode())
     return "collected", best.file, why
+
+
+def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Write a CSV table with the keys of the rows as columns; formulas become text."""
+    columns = {key: "" for row in sorted(rows, key=len, reverse=True) for key in row}
+    content = io.StringIO(newline="")
+    table = csv.writer(content, lineterminator="\n")
+    for row in (dict(zip(columns, columns, strict=True)), *rows):
+        cells = [str(row.get(key, "")) for key in columns]
+        formula = ("=", "+", "-", "@", "\t", "\r")
+        table.writerow(f"'{cell}" if cell.startswith(formula) else cell for cell in cells)
+    replace_file(path, content.getvalue().encode("utf-8-sig"))  # Excel needs the byte order mark

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rbclassroom.assignments.student_code import EMPTY, NotYet, call_student
+from rbclassroom.assignments.marking import EMPTY, NotYet, call_student
 from rbcourse import Array
 
 Function = Callable[..., Any]

@@ -84,16 +84,15 @@ def _look(file: File, stream: IO[bytes], room: list[int], depth: int = 0) -> Ite
                 yield from _look_into(zipped, file, room, depth)
         else:
             content = stream.read(FILE_BYTES + 1)
-            large = len(content) > FILE_BYTES
-            if suffix != ".ipynb" and (large or not _holds_notebook(content)):
-                yield file._replace(kind="ignored", why="it is neither a notebook nor a zip")
-                return
-            if large:
+            if len(content) > FILE_BYTES:
                 raise ValueError("it is too large")
-            read_notebook(content, "it")
+            read_notebook(content, "it")  # a browser may have added .json or .txt to its name
             yield file._replace(content=content)
     except Exception as error:  # a damaged zip raises many kinds of errors
-        yield file._replace(kind="refused", why=str(error) or type(error).__name__)
+        if isinstance(error, ValueError) and suffix not in (".ipynb", ".zip"):
+            yield file._replace(kind="ignored", why="it is neither a notebook nor a zip")
+        else:
+            yield file._replace(kind="refused", why=str(error) or type(error).__name__)
 
 
 def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iterator[File]:
@@ -124,14 +123,6 @@ def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iter
             yield found._replace(kind="refused", why=str(error) or type(error).__name__)
             continue
         yield from _look(found, io.BytesIO(content), room, depth + 1)
-
-
-def _holds_notebook(content: bytes) -> bool:
-    """Tell whether a file with any name is a notebook; browsers add .json or .txt to the name."""
-    with contextlib.suppress(ValueError):
-        read_notebook(content, "it")
-        return True
-    return False
 
 
 def find_owners(files: list[File], found: list[str]) -> list[dict[str, str] | None]:

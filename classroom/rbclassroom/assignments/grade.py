@@ -8,9 +8,9 @@ import re
 import signal
 import sys
 import tempfile
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
@@ -26,10 +26,9 @@ from traitlets.config import Config
 
 from rbclassroom.assignments import locked_cells, sandbox
 from rbclassroom.assignments.autograding import configure
-from rbclassroom.assignments.collect import read_owners, read_report
+from rbclassroom.assignments.collect import read_owners, read_report, write_csv
 from rbclassroom.assignments.handout import find_set, pack, read_config
 from rbclassroom.assignments.locked_cells import grade_id, is_answer
-from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.submissions import Refused, read_notebook
 from rbclassroom.assignments.tables import update
 from rbcourse.files import replace_file
@@ -64,42 +63,45 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
             how = "--without-box runs them with all your rights"
             raise ValueError(f"No submission was run, because there is no sandbox: {why}; {how}.")
         print(f"Submissions run without a sandbox and with all your rights: {why}.", flush=True)
-    jobs, tables = [job for name in chosen for job in _prepare(name, assignments)], []
-    rows: dict[Job, Row] = {}
+    jobs = [job for name in dict.fromkeys(chosen) for job in _prepare(name, assignments)]
     progress = _Progress(assignments, jobs, boxed=not why)
     if progress.results:
         print(f"The earlier run continues: {len(progress.results)} submissions are graded.")
+    tables, rows = list[Path](), dict[Job, Row]()
     try:
-        with closing(_graded(jobs, progress, assignments)) as graded:
-            for (name, student), row in graded:
-                said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
-                said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
-                said += [row["remarks"]] if row["remarks"] else []
-                start = {"student": student, "set": name, "boxed": "no" if why else "yes"}
-                rows[name, student] = start | row
-                print(f"{name}, {student}: {'; '.join(said)}", flush=True)
-                own = [job for job in jobs if job[0] == name]
-                if rows.keys() >= {*own}:
-                    tables.append(_write_table(name, [rows[job] for job in own], assignments))
-                    progress.forget(own)
+        for name in dict.fromkeys(chosen):
+            own = [job for job in jobs if job[0] == name]
+            _grade_set(own, progress, assignments, rows)
+            tables.append(_write_table(name, [rows[job] for job in own], assignments))
+            progress.forget(own)
     except KeyboardInterrupt:
-        count = f"{len(rows)} of {len(jobs)} submissions are graded"
+        count = f"{len({*rows, *progress.results})} of {len(jobs)} submissions are graded"
         print(f"Stopped: {count}. Run this again to continue; then the tables are written.")
         raise
     return tables
 
 
-def _write_table(name: str, rows: list[Row], assignments: Path) -> Path:
+def _print_row(row: Row) -> None:
+    said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
+    said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
+    said += [row["remarks"]] if row["remarks"] else []
+    print(f"{row['set']}, {row['student']}: {'; '.join(said)}", flush=True)
+
+
+def _write_table(name: str, graded: list[Row], assignments: Path) -> Path:
     """Write the table of a set, with a line for each file that was not collected, and the pages."""
-    why_late = _why_late(assignments)
-    for row in rows:
+    why_late = {
+        row["what"]: row["why"] for row in read_report(assignments) if row["list"] == "late"
+    }
+    owners, rows = read_owners(assignments), list[Row]()
+    for row in graded:
+        student = row["student"]
+        number, who = owners.get(f"{student}/{name}", ("", ""))
+        rows.append({"student": student, "number": number, "name": who} | row)
         if not row.get("late"):  # nbgrader knows no due date, or the submission was refused
-            row["late"] = why_late.get(f"{row['student']}, {name}", "")
-    owners = read_owners(assignments)
-    for at, row in enumerate(rows):
-        number, who = owners.get(f"{row['student']}/{name}", ("", ""))
-        rows[at] = {"student": row["student"], "number": number, "name": who} | row
-    for what, reason in _not_collected(name, assignments, {row["student"] for row in rows}):
+            why = why_late.get(f"{student}, {name}", "")
+            rows[-1]["late"] = "perhaps" if why.startswith("perhaps") else why
+    for what, reason in _not_collected(name, assignments, {row["student"] for row in graded}):
         number, who = owners.get(what, ("", ""))
         row = {"student": _tidy(what), "number": number, "name": who, "set": name}
         rows.append(row | {"remarks": _tidy(reason)})
@@ -191,52 +193,54 @@ def _state(job: Job, assignments: Path) -> list[list[Any]]:
     return [[name, about.st_size, about.st_mtime_ns] for name, about in facts]
 
 
-def _graded(
-    jobs: list[Job], progress: _Progress, assignments: Path
-) -> Generator[tuple[Job, Row], None, None]:
-    """Grade submissions in parallel, one per student at a time; yield their rows.
+def _grade_set(
+    jobs: list[Job], progress: _Progress, assignments: Path, rows: dict[Job, Row]
+) -> None:
+    """Grade the submissions of a set in parallel; print and store their rows.
 
-    If the caller stops early, the submissions at work are ended, and lose their earlier points and
-    their feedback, because a part of the new ones may be stored.
+    After Ctrl-C, the submissions at work are ended, and lose their earlier points and their
+    feedback, because a part of the new ones may be stored.
     """
-    course = CourseDirectory(config=course_config(jobs[0][0], assignments))
+    name, boxed = jobs[0][0], progress.boxed
+    course = CourseDirectory(config=course_config(name, assignments))
     todo = [job for job in jobs if job not in progress.results]
     works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
     folder = Path(tempfile.mkdtemp())  # for all kernels
     worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY, str(folder)))
     with Gradebook(course.db_url) as gradebook:
         known = _points(gradebook)
-        earlier = {job: _row(gradebook, *job, result) for job, result in progress.results.items()}
-    yield from earlier.items()
+        for job in (job for job in jobs if job in progress.results):
+            rows[job] = _row(gradebook, job, progress.results[job], boxed)
+            _print_row(rows[job])
     with ExitStack() as stack:
         stack.callback(sandbox.delete, folder)
         free = [stack.enter_context(worker()) for _ in range(WORKERS)]
         try:
             while todo or works:
-                at_work = {student for (_, student), _ in works.values()}
-                ready = [job for job in todo if job[1] not in at_work]
-                if free and ready:
-                    job, pool = ready[0], free.pop()
-                    todo.remove(job)
+                while todo and free:
+                    job, pool = todo.pop(0), free.pop()
                     with _without_ctrl_c():
-                        work = pool.submit(grade_one, *job, assignments, progress.boxed)
-                        works[work] = job, pool
-                    continue
+                        works[pool.submit(grade_one, *job, assignments, boxed)] = job, pool
+                at_work = {student for (_, student), _ in works.values()}
                 for work in wait(works, return_when=FIRST_COMPLETED).done:
                     job, pool = works.pop(work)
                     broken = isinstance(work.exception(), BrokenExecutor)
                     free.append(stack.enter_context(worker()) if broken else pool)
+                    result = _result(work)
                     with Gradebook(course.db_url) as gradebook:
-                        result = _result(work)
                         if isinstance(result, str):
                             _withdraw(gradebook, assignments, *job)
-                        row = _row(gradebook, *job, result)
+                        row = _row(gradebook, job, result, boxed)
                         known, before = _points(gradebook), known
-                    _check_others(known ^ before, at_work, job[0])
+                    if others := sorted({student for student, *_ in known ^ before} - at_work):
+                        when = f"during the grading of {' and '.join(sorted(at_work))}"
+                        where = f"The earlier points are in gradebook.before-{name}.db."
+                        raise ValueError(f"The points of {others[0]} changed {when}. {where}")
                     if isinstance(result, list):
                         progress.keep(job, result)
-                    yield job, row
-        except (KeyboardInterrupt, GeneratorExit):
+                    rows[job] = row
+                    _print_row(row)
+        except KeyboardInterrupt:
             with _without_ctrl_c():
                 for process in active_children():
                     process.kill()
@@ -245,14 +249,6 @@ def _graded(
                     for job, _ in works.values():
                         _withdraw(gradebook, assignments, *job)
             raise
-
-
-def _check_others(changed: Points, at_work: set[str], name: str) -> None:
-    """Raise ValueError if points of students changed whose submissions were not at work."""
-    if others := sorted({student for student, *_ in changed} - at_work):
-        when = f"during the grading of {' and '.join(sorted(at_work))}"
-        where = f"The earlier points are in gradebook.before-{name}.db."
-        raise ValueError(f"The points of {others[0]} changed {when}. {where}")
 
 
 def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator[tuple[str, str]]:
@@ -273,12 +269,6 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
             yield what, f"nothing usable was handed in: {row['why']}"
         elif row["list"] in ("refused", "unmatched") and what not in unusable:
             yield what, f"not collected: {row['why']}"
-
-
-def _why_late(assignments: Path) -> dict[str, str]:
-    """Return why submissions are late, or "perhaps", as `collect` has found."""
-    late = {row["what"]: row["why"] for row in read_report(assignments) if row["list"] == "late"}
-    return {what: "perhaps" if why.startswith("perhaps") else why for what, why in late.items()}
 
 
 def course_config(name: str, assignments: Path) -> Config:
@@ -337,7 +327,9 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     config = course_config(name, folder)
     config.BoxedExecute.boxed = boxed
     config.CourseDirectory.student_id = student
-    with _time_limit(300 + 2 * config.BoxedExecute.get("seconds", 600)):
+    alarm = getattr(signal, "alarm", lambda _: None)  # Windows has none
+    alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))  # it ends this process
+    try:
         graded = folder / "autograded" / student / name / f"{name}.ipynb"
         before = _words(graded)
         if glob.escape(student) != student:  # nbgrader reads this name as a pattern
@@ -356,23 +348,8 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
         if not done["success"]:
             remarks.append(f"no feedback was written: {last_line(done)}")
         return remarks
-
-
-@contextmanager
-def _time_limit(seconds: int) -> Iterator[None]:
-    """End this process if the grading and the feedback in this context take longer."""
-    if not hasattr(signal, "alarm"):  # on Windows
-        yield
-        return
-    signal.alarm(seconds)
-    try:
-        yield
     finally:
-        signal.alarm(0)
-
-
-def _to_do(grades: Iterable[Any]) -> list[str]:
-    return [g.name for g in grades if g.auto_score is None and g.manual_score is None]
+        alarm(0)
 
 
 def _words(path: Path) -> dict[str, str]:
@@ -407,9 +384,11 @@ def _result(work: Future[list[str]]) -> list[str] | str:
     return work.result()
 
 
-def _row(gradebook: Any, name: str, student: str, result: list[str] | str) -> Row:
+def _row(gradebook: Any, job: Job, result: list[str] | str, boxed: bool) -> Row:
+    name, student = job
+    row: Row = {"student": student, "set": name, "boxed": "yes" if boxed else "no"}
     if isinstance(result, str):
-        return {"remarks": f"refused: {_tidy(result)}"}
+        return row | {"remarks": f"refused: {_tidy(result)}"}
     submission = gradebook.find_submission_notebook(name, name, student)
     order = [cell.name for cell in submission.notebook.source_cells]
     grades = sorted(submission.grades, key=lambda grade: order.index(grade.name))
@@ -417,16 +396,20 @@ def _row(gradebook: Any, name: str, student: str, result: list[str] | str) -> Ro
     if submission.score > submission.max_score + extra:
         total = f"{submission.score:g} of {submission.max_score:g}"
         raise ValueError(f"{student} has {total} points; look at the gradebook")
-    to_do = _to_do(grades)
+    to_do = [g.name for g in grades if g.auto_score is None and g.manual_score is None]
     late = submission.assignment.total_seconds_late
-    return {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades} | {
-        "automatic": f"{sum(grade.auto_score or 0 for grade in grades):g}",
-        "total": f"{submission.score:g}",
-        "maximum": f"{submission.max_score:g}",
-        "by hand": " ".join(to_do),
-        "late": f"{late / 3600:.1f} h" if late else "",
-        "remarks": "; ".join(map(_tidy, result)),
-    }
+    return (
+        row
+        | {g.name: "" if g.name in to_do else f"{g.score:g}" for g in grades}
+        | {
+            "automatic": f"{sum(grade.auto_score or 0 for grade in grades):g}",
+            "total": f"{submission.score:g}",
+            "maximum": f"{submission.max_score:g}",
+            "by hand": " ".join(to_do),
+            "late": f"{late / 3600:.1f} h" if late else "",
+            "remarks": "; ".join(map(_tidy, result)),
+        }
+    )
 
 
 def _tidy(words: str) -> str:

@@ -21,9 +21,9 @@ from traitlets.config.loader import PyFileConfigLoader
 
 from rbclassroom.assignments.locked_cells import is_answer
 from rbclassroom.assignments.notebook_runner import BoundedClient
-from rbclassroom.assignments.safe_files import write_whole
 from rbclassroom.assignments.tables import update
 from rbclassroom.course.notebooks import KERNEL
+from rbcourse.files import replace_file
 
 LEFTOVER = re.compile(
     r"#+ *(?:BEGIN|END)\b.*|(?:BEGIN|END) +(?:SOLUTION|HIDDEN|MARK)|MARK +SCHEME|HIDDEN +TESTS?",
@@ -124,7 +124,13 @@ def make_handout(name: str, assignments: Path, course: Path) -> Path:
     if taken := files.keys() & own.keys():
         raise ValueError(f"{name}: rename {min(taken)}; the handout has its own file of this name")
     packed = pack({f"{name}/{path}": data for path, data in {**files, **own}.items()})
-    return write_whole(assignments / "handouts" / f"{name}.zip", packed)
+    return _write(assignments / "handouts" / f"{name}.zip", packed)
+
+
+def _write(path: Path, content: bytes) -> Path:
+    path.parent.mkdir(exist_ok=True)
+    replace_file(path, content)
+    return path
 
 
 def pack(files: dict[str, bytes]) -> bytes:
@@ -158,4 +164,4 @@ def make_solutions(name: str, assignments: Path) -> Path:
         client.execute(cwd=str(work))
     notebook.metadata = NotebookNode({"kernelspec": dict(KERNEL)})
     target = assignments / "handouts" / f"{name}-solutions.ipynb"
-    return write_whole(target, (nbformat.writes(notebook) + "\n").encode())
+    return _write(target, (nbformat.writes(notebook) + "\n").encode())

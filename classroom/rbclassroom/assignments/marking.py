@@ -7,21 +7,23 @@ this mistake.
 """
 
 import copy
+import linecache
+import textwrap
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from rbclassroom.assignments.student_code import NotYet, call_student
 from rbcourse import Array
 
 SHOWN = 16  # larger arrays are described by their shape
 IN_RADIANS = (
     "Angles are in radians here, and NumPy's functions take and return radians: convert nothing."
 )
-
-
+EMPTY = "Your function stops at raise NotImplementedError(). Write your answer in place of it."
+_rows = np.atleast_1d
 GENERAL: dict[str, Callable[[Array, Array], list[Array]]] = {
     "Your result is transposed.": lambda right, got: [right.T],
     "The entries of your result are in the reverse order.": lambda right, got: [_rows(right)[::-1]],
@@ -38,6 +40,45 @@ GENERAL: dict[str, Callable[[Array, Array], list[Array]]] = {
     ),
 }
 """The hints of mistakes that can be made in every problem, and the results of these mistakes."""
+
+
+class NotYet(AssertionError):
+    """An error with a message for the student, which a notebook shows without a traceback.
+
+    If the message is a hint, `case` is an example: the right result, and that of the function.
+    """
+
+    def __init__(self, message: str, case: str = "") -> None:
+        super().__init__(message)
+        self.case = case
+
+    def _render_traceback_(self) -> list[str]:
+        texts = [textwrap.wrap(text, 80) for text in (str(self), self.case) if text]
+        return [line for lines in texts for line in ("", *lines)][1:]
+
+
+def call_student(function: Any, arguments: tuple[Any, ...], times: int = 1) -> list[Any]:
+    """Return the results of a student's function, one for each call.
+
+    Raise `NotYet` if the function raises an error.
+    """
+    try:
+        return [function(*arguments) for _ in range(times)]
+    except NotImplementedError as error:
+        *_, (frame, _) = traceback.walk_tb(error.__traceback__)
+        name = frame.f_code.co_name
+        if name != getattr(function, "__name__", name):
+            why = f"Your function calls {name}, where nothing is written yet."
+            raise NotYet(why) from None
+        raise NotYet(EMPTY) from None
+    except Exception as error:
+        lines = [
+            linecache.getline(frame.f_code.co_filename, line).strip()
+            for frame, line in traceback.walk_tb(error.__traceback__)
+            if frame.f_globals.get("__name__") == "__main__"
+        ]
+        where = f' at "{lines[-1]}"' if lines and lines[-1] else ""
+        raise NotYet(f"Your function stops{where}: {type(error).__name__}: {error}") from None
 
 
 class Mistake(NamedTuple):
@@ -253,10 +294,6 @@ def _first_rows(right: Array, count: int) -> Array:
     """Return the first results; no loop makes more than one row of a square matrix at a time."""
     square = right.ndim == 2 and len(right) == right.shape[1]
     return _rows(right)[: 1 if square else count]
-
-
-def _rows(array: Array) -> Array:
-    return array if array.ndim else array[None]
 
 
 def _plain(value: Any) -> Any:

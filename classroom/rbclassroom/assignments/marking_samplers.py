@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rbclassroom.assignments.marking import Mistake, as_numbers, show
-from rbclassroom.assignments.student_code import NotYet, call_student
+from rbclassroom.assignments.marking import Mistake, NotYet, as_numbers, call_student, show
 from rbcourse import Array, exp_so3, matrix_from_quaternion
 from rbcourse.sampling import Rng, angle_law
 

@@ -29,6 +29,7 @@ from rbclassroom.assignments.problems import loaded, made, start_folder
 from rbcourse import exp_so3
 
 FILE = "my_motion.py"
+Cells = Sequence[tuple[str, str]]  # names and code
 OWN = "# %% my own functions"
 _HEAD = '''"""My motions: the functions that I wrote in the problem sets on rotations.
 
@@ -121,12 +122,7 @@ def kept() -> str:
 
 
 def keep(
-    text: str,
-    name: str,
-    data: str,
-    cells: Sequence[tuple[str, str]],
-    passed: Sequence[str],
-    by: str = "",
+    text: str, name: str, data: str, cells: Cells, passed: Sequence[str], by: str = ""
 ) -> tuple[str, str]:
     """Return the text of the student's file with the accepted functions of a set, and a message.
 
@@ -134,11 +130,15 @@ def keep(
     of its ``NAME.json``. `cells` has names and code of the student's cells, and `passed` the
     problems whose tests have passed. The new file is run, and must pass these tests, too.
     """
+    problems = {slug: each for slug, each in loaded(data).items() if isinstance(each, dict)}
+    wanted = {k: each["keep"] for k, each in problems.items() if "keep" in each and k in passed}
+    if not wanted:
+        return text, ""
     try:
-        new, functions = _grown(text, name, data, cells, passed, by or _account())
-        return new, f"{FILE} has your {', '.join(functions)}" if functions else ""
+        new = _grown(text, name, problems, cells, wanted, by or _account())
     except _Unchanged as why:
         return text, f"{FILE} is not changed: {why}"
+    return new, f"{FILE} has your {', '.join(wanted.values())}"
 
 
 class _Unchanged(Exception):
@@ -157,17 +157,8 @@ class _Statement(NamedTuple):
 
 
 def _grown(
-    text: str,
-    name: str,
-    data: str,
-    cells: Sequence[tuple[str, str]],
-    passed: Sequence[str],
-    by: str,
-) -> tuple[str, list[str]]:
-    problems = {slug: each for slug, each in loaded(data).items() if isinstance(each, dict)}
-    wanted = {k: each["keep"] for k, each in problems.items() if "keep" in each and k in passed}
-    if not wanted:
-        return text, []
+    text: str, name: str, problems: dict[str, Any], cells: Cells, wanted: dict[str, str], by: str
+) -> str:
     head, parts, own = _split(text.strip() or _HEAD.format(by=by) + f"\n{OWN}")
     old = parts.pop(name, "")
     accepted = old.partition("\n")[0].split(" · ")[-1].split(", ") if old else []
@@ -182,7 +173,7 @@ def _grown(
     body = "\n\n".join([*(parts[key] for key in sorted(parts)), own])
     new = f"{_with_imports(head, kept, body)}\n\n{body}\n"
     _test(new, {function: problems[slug] for slug, function in wanted.items()})
-    return new, [*wanted.values()]
+    return new
 
 
 def _account() -> str:
@@ -233,9 +224,7 @@ def _code_of(node: ast.stmt, lines: list[str], given: Sequence[str | None]) -> s
     return "\n".join(line for line in kept.values() if line.strip() != "# YOUR CODE HERE")
 
 
-def _needed(
-    cells: Sequence[tuple[str, str]], wanted: dict[str, str], given: Sequence[str | None]
-) -> list[_Statement]:
+def _needed(cells: Cells, wanted: dict[str, str], given: Sequence[str | None]) -> list[_Statement]:
     """Return the statements that the wanted functions need, in the order of the cells."""
     read = [(cell, each) for cell, text in cells for each in _read(text, given)]
     course = re.compile(r"from (rbclassroom|my_motion)\b|import my_motion\b|.*= mine\(")

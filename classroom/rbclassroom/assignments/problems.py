@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from rbclassroom.assignments.marking import Drawing, Mistake, Problem
+from rbclassroom.assignments.marking import Drawing, Mistake, NotYet, Problem
 from rbclassroom.assignments.marking_samplers import LAWS, Sampler
-from rbclassroom.assignments.student_code import NotYet
 
 
 def problem(name: str, slug: str) -> Problem | Sampler:

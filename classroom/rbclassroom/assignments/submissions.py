@@ -20,6 +20,7 @@ from rbclassroom.assignments.locked_cells import grade_id, is_answer, marks_of, 
 
 MANY = 3  # more cells with the same change get one remark
 ELSEWHERE = "# This answer is in another cell."
+DAMAGE = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 MAKE: dict[str, Any] = {"code": new_code_cell, "markdown": new_markdown_cell, "raw": new_raw_cell}
 
 
@@ -46,18 +47,13 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
         cells = [_clean(raw) for sheet in sheets for raw in sheet["cells"]]
         if not cells:
             raise ValueError("it has no cells")
-    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError) as error:
-        raise _damaged(name, f"{type(error).__name__}: {error}") from error
-    except ValueError as error:
-        raise _damaged(name, str(error)) from error
+    except DAMAGE as error:
+        why = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        cure = "take an earlier copy, or start again from the handout"
+        raise Refused(f"{name} is damaged or not a notebook ({why[:80]}); {cure}") from error
     for at, cell in enumerate(cells):
         cell.id = f"read-{at}"
     return new_notebook(cells=cells)
-
-
-def _damaged(name: str, why: str) -> Refused:
-    cure = "take an earlier copy, or start again from the handout"
-    return Refused(f"{name} is damaged or not a notebook ({why[:80]}); {cure}")
 
 
 def _clean(raw: dict[str, Any]) -> NotebookNode:
@@ -114,9 +110,8 @@ def _core(text: str) -> str:
 
 def _around(text: str, locked: str) -> list[str]:
     """Return the parts of a text before and after a locked text, or [] if it is not there."""
-    lines, wanted = (
-        [line.rstrip() for line in each.split("\n")] for each in (text, locked.strip())
-    )
+    lines = [line.rstrip() for line in text.split("\n")]
+    wanted = [line.rstrip() for line in locked.strip().split("\n")]
     for at in range(len(lines)):
         if any(wanted) and lines[at : at + len(wanted)] == wanted:
             return ["\n".join(part).strip("\n") for part in (lines[:at], lines[at + len(wanted) :])]
@@ -176,11 +171,8 @@ class _Restoring:
 
     def is_empty(self, cell: NotebookNode) -> bool:
         """Tell whether a cell of the set has no other text than the original."""
-        given, own = (
-            _core(each.source.replace("# YOUR CODE HERE", ""))
-            for each in (self.wanted[grade_id(cell)], cell)
-        )
-        return own in ("", given)
+        given = self.wanted[grade_id(cell)].source.replace("# YOUR CODE HERE", "")
+        return _core(cell.source.replace("# YOUR CODE HERE", "")) in ("", _core(given))
 
     def find(self) -> int:
         """Name the cells of the set by mark, id or text; return the number of other names."""

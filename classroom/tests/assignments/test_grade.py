@@ -26,11 +26,10 @@ from traitlets.config import Config
 from rbclassroom.assignments import grade as grading
 from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.__main__ import main
-from rbclassroom.assignments.autograding import configure
-from rbclassroom.assignments.feedback import _said
+from rbclassroom.assignments.autograding import _said, configure
+from rbclassroom.assignments.collect import write_csv
 from rbclassroom.assignments.grade import grade, grade_one
 from rbclassroom.assignments.handout import read_config
-from rbclassroom.assignments.safe_files import write_csv
 from rbclassroom.assignments.submissions import Refused
 
 ROOT = Path(__file__).parents[3]
@@ -243,7 +242,7 @@ def again(tmp_path_factory, course):
     (again.folder / "source" / "ps1").mkdir()
     rows = [dict(zip(("list", "what", "why"), line, strict=True)) for line in LISTED]
     write_csv(again.folder / "submitted" / "report.csv", rows)
-    owners = {"tampers/ps0": ["4711", "Ann Ames"], "stuck/ps0": "12"}
+    owners = {"tampers/ps0": ["4711", "Ann Ames"], "stuck/ps0": ["12", "Sam"]}
     (again.folder / "submitted" / "owners.json").write_text(json.dumps(owners))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grading, "ProcessPoolExecutor", Killed)

@@ -5,8 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from test_student_code import student, told
 
-from rbclassroom.assignments.marking import IN_RADIANS, Drawing, Mistake, Problem, curves_of
-from rbclassroom.assignments.student_code import NotYet
+from rbclassroom.assignments.marking import IN_RADIANS, Drawing, Mistake, NotYet, Problem, curves_of
 
 X = [(np.array([1.0, -2.0]), 1), (np.array([0.5, 4.0]), 3)]
 DOUBLE = Problem(

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
+from rbclassroom.assignments.marking import NotYet
 from rbclassroom.assignments.problems import problem
-from rbclassroom.assignments.student_code import NotYet
 from rbclassroom.assignments.tables import update
 
 SOURCE = Path(__file__).parents[3] / "notebooks" / "assignments" / "source"

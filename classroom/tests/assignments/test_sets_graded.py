@@ -17,7 +17,7 @@ from test_problems import SETS, SOURCE, TABLES
 
 from rbclassroom.assignments.grade import grade
 from rbclassroom.assignments.handout import make_handout, release
-from rbclassroom.assignments.student_code import EMPTY
+from rbclassroom.assignments.marking import EMPTY
 
 FIRST, *_, LAST = SETS
 PROBLEMS = [slug for slug, table in TABLES[FIRST].items() if isinstance(table, dict)][1:]

@@ -4,7 +4,7 @@ from textwrap import dedent
 
 import pytest
 
-from rbclassroom.assignments.student_code import NotYet, call_student
+from rbclassroom.assignments.marking import NotYet, call_student
 
 
 def student(source):

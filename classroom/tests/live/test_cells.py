@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from rbclassroom.assignments.student_code import NotYet
+from rbclassroom.assignments.marking import NotYet
 from rbclassroom.live import cells
 
 
@@ -96,7 +96,7 @@ def test_errors_state_their_place():
         "ZeroDivisionError: division by zero",
     ]
     assert run([], "x = (")[2][0][1].splitlines()[-1].startswith("SyntaxError")
-    hint = "from rbclassroom.assignments.student_code import NotYet\nraise NotYet('Turn it round.')"
+    hint = "from rbclassroom.assignments.marking import NotYet\nraise NotYet('Turn it round.')"
     assert run([], hint)[2] == [("hint", str(NotYet("Turn it round.")))]
 
 
