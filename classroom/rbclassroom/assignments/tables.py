@@ -20,10 +20,10 @@ from typing import Any
 import nbformat
 import numpy as np
 
+from rbclassroom.assignments import twins
 from rbclassroom.assignments.locked_cells import grade_id
 from rbclassroom.assignments.marking import curves_of, draw
 from rbclassroom.assignments.marking_samplers import LAWS, quantiles
-from rbclassroom.assignments.twins import only_twins
 from rbcourse.files import replace_file
 
 DRAWS = 5000
@@ -57,9 +57,12 @@ def _problems(path: Path, notebook: Path) -> dict[str, dict[str, Any]]:
     cells = {grade_id(cell): cell.source for cell in read if cell.cell_type == "code"}
     answers = [text for name, text in cells.items() if name.endswith("-answer")]
     space: dict[str, Any] = {"__name__": "__main__"}
-    with only_twins():
+    twins.alone = True
+    try:
         for text in (cells.get("setup", ""), *answers, table.pop("helpers", "")):
             exec(compile(text, path.stem, "exec"), space)
+    finally:
+        twins.alone = False
     found, own = {}, table.pop("own", "")
     for slug, problem in table.items():
         try:

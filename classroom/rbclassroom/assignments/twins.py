@@ -4,9 +4,6 @@ Later sets use them where a student's own function is missing or wrong. R, R0 an
 shape (3, 3), and t is a number.
 """
 
-import contextlib
-from collections.abc import Iterator
-
 import numpy as np
 
 import rbcourse as rb
@@ -45,14 +42,3 @@ def projected_cubic(R0: Array, R1: Array, w0: Array, w1: Array, t: float) -> Arr
 
 alone = False
 """Whether `my_motion.mine` returns only the functions of this module, without a word."""
-
-
-@contextlib.contextmanager
-def only_twins() -> Iterator[None]:
-    """Set `alone` for a while."""
-    global alone
-    before, alone = alone, True
-    try:
-        yield
-    finally:
-        alone = before

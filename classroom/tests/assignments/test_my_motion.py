@@ -178,7 +178,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_a_later_set_uses_right_functions_and_replaces_others(folder, capsys):
+def test_a_later_set_uses_right_functions_and_replaces_others(folder, capsys, monkeypatch):
     assert mine("exp_so3") is twins.exp_so3
     assert "does not contain them yet" in capsys.readouterr().out
     right = (
@@ -196,7 +196,8 @@ def test_a_later_set_uses_right_functions_and_replaces_others(folder, capsys):
         "hat_so3, cubic: the course's, because yours give other results",
         f"log_so3: the course's, because {FILE} does not contain them yet",
     ]
-    with twins.only_twins():
+    with monkeypatch.context() as patch:
+        patch.setattr(twins, "alone", True)
         assert mine("vee_so3") is twins.vee_so3
     flat = "a = np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))"  # 0 for an angle of 1e-9
     inexact = f"def log_so3(R):\n    {flat}\n    return a * vee_so3(R) / max(np.sin(a), 1e-99)\n"
