@@ -31,7 +31,7 @@ from traitlets.config import Config
 from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.locked_cells import is_answer, is_test, marks_of, name_cell, title_of
 from rbclassroom.assignments.marking import EMPTY
-from rbclassroom.assignments.notebook_runner import CUT, BoundedClient, without_number
+from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 from rbclassroom.assignments.submissions import Refused, read_notebook, restore
 
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
@@ -251,7 +251,7 @@ def _said(cell: NotebookNode) -> list[str]:
         if output.get("ename") == "NotImplementedError":
             return [EMPTY]
         if output.output_type == "error":
-            return [f"{output.ename}: {without_number(output.evalue)}"]
+            return [f"{output.ename}: {output.evalue}"]
     return []
 
 

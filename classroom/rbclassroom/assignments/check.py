@@ -20,7 +20,7 @@ from nbformat import NotebookNode
 from rbclassroom.assignments import locked_cells
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, is_test, name_cell
 from rbclassroom.assignments.my_motion import FILE, find, keep
-from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient, without_number
+from rbclassroom.assignments.notebook_runner import CELL_SECONDS, CUT, BoundedClient
 from rbclassroom.assignments.submissions import count_found, read_notebook, restore
 from rbclassroom.course import options
 from rbclassroom.course.notebooks import KERNEL
@@ -177,8 +177,6 @@ def _error(cell: NotebookNode) -> str:
     if not errors:
         return ""
     lines = re.sub(r"\x1b\[[0-9;]*m", "", errors[-1].evalue).strip().splitlines() or [""]
-    if errors[-1].ename == "SyntaxError":
-        lines = [without_number(lines[-1])]
     hint = lines[-1] and errors[-1].ename == "NotYet"  # show a hint without the name of its error
     return lines[-1][:400] if hint else f"{errors[-1].ename}: {lines[-1][:400]}".rstrip(": ")
 

@@ -24,11 +24,11 @@ from nbgrader.coursedir import CourseDirectory
 from nbgrader.utils import capture_log, rmtree
 from traitlets.config import Config
 
-from rbclassroom.assignments import locked_cells, sandbox
+from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.collect import read_owners, read_report, write_csv
 from rbclassroom.assignments.handout import find_set, pack, read_config
-from rbclassroom.assignments.locked_cells import grade_id, is_answer
+from rbclassroom.assignments.locked_cells import grade_id, is_answer, marks_of
 from rbclassroom.assignments.submissions import Refused, read_notebook
 from rbclassroom.assignments.tables import update
 from rbcourse.files import replace_file
@@ -47,13 +47,10 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
 
     The function prints a line for each submission, and writes feedback and a table for each set.
     If there is no sandbox, ValueError is raised and nothing is run or written, unless `without_box`
-    is true. Submissions then run with all rights of the lecturer. Points given by hand are kept. A
-    submission that is refused loses its feedback and its earlier automatic points. If a student's
-    points exceed the maximum, or change while another student is graded, ValueError is raised and
-    no table is written. The file ``gradebook.before-NAME.db`` is a copy of the gradebook before the
-    run. Ctrl-C ends the submissions at work, which then count as not graded, and leaves the tables
-    of incomplete sets as they were. If a run was interrupted, the next one continues: it does not
-    run again the submissions whose files, and whose set, have not changed since.
+    is true. Points given by hand are kept. A submission that is refused loses its feedback and its
+    earlier automatic points. If a student's points exceed the maximum, or change while another
+    student is graded, ValueError is raised and no table is written. If a run was interrupted, the
+    next one continues, with the submissions whose files have changed and those not yet graded.
     """
     chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
     if not chosen:
@@ -256,12 +253,11 @@ def _not_collected(name: str, assignments: Path, students: set[str]) -> Iterator
     report = read_report(assignments)
     useless = [row for row in report if row["list"] == "nothing usable"]
     unusable = "".join(row["why"] for row in useless)
+    known = students | {row["what"] for row in useless}
     for row in report:
         what, student = row["what"], row["what"].removesuffix(f", {name}")
         named = {each for each in sets if each in f"{what} {row['why']}".casefold()}
-        if row["list"] == "missing" and student != what and student not in students:
-            if student in {each["what"] for each in useless}:
-                continue  # this student has a row of the other kind
+        if row["list"] == "missing" and student not in {what, *known}:
             yield student, "no file was collected"
         elif name not in (row["sets"].split() or named or {name}) or (named and name not in named):
             continue
@@ -355,7 +351,7 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
 def _words(path: Path) -> dict[str, str]:
     """Return the answers to grade by hand in an autograded notebook."""
     cells = nbformat.read(path, as_version=4).cells if path.exists() else []
-    words = (cell for cell in cells if is_answer(cell) and locked_cells.marks_of(cell).get("grade"))
+    words = (cell for cell in cells if is_answer(cell) and marks_of(cell).get("grade"))
     return {grade_id(cell): cell.source for cell in words}
 
 

@@ -70,6 +70,8 @@ class BoundedClient(NotebookClient):
         if kind == "error":
             content |= ASKED if content["ename"] == NO_INPUT else {}
             content |= {key: str(content[key])[:5000] for key in ("ename", "evalue")}
+            # the file of a syntax error is a number for a cell
+            content["evalue"] = re.sub(r"\(\S+, (line \d+)\)$", r"(\1)", content["evalue"])
             content["traceback"] = [str(line)[:5000] for line in content["traceback"][-50:]]
         elif kind == "stream" or kind in DISPLAYS:
             if kind != "stream":  # drop widgets, because they do not work without a kernel
@@ -109,8 +111,3 @@ class BoundedClient(NotebookClient):
                 cell.outputs.append(new_output("error", **error))
         if cell_index in self.cut:
             cell.outputs.append(new_output("stream", name="stdout", text=f"\n({CUT})\n"))
-
-
-def without_number(message: str) -> str:
-    """Return the message of a syntax error without the file, which is a number for a cell."""
-    return re.sub(r"\(\S+, (line \d+)\)$", r"(\1)", message)

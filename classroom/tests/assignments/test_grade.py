@@ -18,7 +18,6 @@ from zipfile import ZipFile
 import nbformat
 import psutil
 import pytest
-from nbformat.v4 import new_code_cell, new_output
 from tiny_class import Class, begun, make_template
 from tiny_set import cell, write_tiny_set
 from traitlets.config import Config
@@ -26,7 +25,7 @@ from traitlets.config import Config
 from rbclassroom.assignments import grade as grading
 from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.__main__ import main
-from rbclassroom.assignments.autograding import _said, configure
+from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.collect import write_csv
 from rbclassroom.assignments.grade import grade, grade_one
 from rbclassroom.assignments.handout import read_config
@@ -274,14 +273,6 @@ def test_pages_are_packed_in_the_folders_of_a_download_from_moodle(again):
         page = again.folder / "feedback" / "tampers" / "ps0" / "ps0.html"
         assert name == "Ann Ames_4711_assignsubmission_file_/ps0.html"
         assert packed.read(name) == page.read_bytes()
-
-
-def test_a_page_shows_syntax_errors_without_a_number_as_their_file():
-    error = new_output(
-        "error", ename="SyntaxError", evalue="'[' was never closed (35429.py, line 3)"
-    )
-    cell = new_code_cell(outputs=[error])
-    assert _said(cell) == ["SyntaxError: '[' was never closed (line 3)"]
 
 
 def test_the_table_lists_students_who_were_not_graded(again):
