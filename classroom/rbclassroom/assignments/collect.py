@@ -111,7 +111,8 @@ def _grouped(
     number and the name of all students, by their labels.
     """
     groups = defaultdict[Group, list[Upload]](list)
-    unused = defaultdict[str, list[str]](list)  # files of students without a notebook
+    unused = defaultdict[str, list[str]](list)  # the files of each student that are not used
+    ids, usable = {row["id"] for row in roster}, set[str]()  # usable: students with a notebook
     files, rows, labels = list(find_files(folder)), list[Row](), dict[str, Owner]()
     found = ["" if file.kind else _set_of(file, sets) for file in files]
     for file, name, about in zip(files, found, find_owners(files, found), strict=True):
@@ -119,7 +120,8 @@ def _grouped(
             why = file.why or "neither its name nor a folder names a student"
             rows.append((file.kind or "unmatched", file.label, why))
             continue
-        label = _label(about, roster)
+        student, name_and_id = _student(about, roster), f"{about['name']} {about['id']}".strip()
+        label = student if student in ids else about["folder"] or name_and_id
         labels[label] = about["id"], about["name"]
         named = _named(Path(about["file"]).stem, sets)
         if file.kind or not name:
@@ -130,14 +132,15 @@ def _grouped(
             prepared, first = "/to_submit/" in f"/{about['file']}", int(about["number"] or 0)
             upload = Upload(first, about["date"], prepared, file.label, about, file.content)
             number = about["id"] or about["folder"] or about["name"]
-            groups[name, _student(about, roster), number].append(upload)
+            groups[name, student, number].append(upload)
+            usable.add(label)
             continue
         rows.append((file.kind or "unmatched", file.label, why))
         unused[label].append(f"{file.label}: {why}")
     for uploads in groups.values():
-        unused.pop(_label(uploads[0].about, roster), None)
         uploads.sort(key=lambda upload: upload[:4])
-    rows += [("nothing usable", who, "; ".join(reasons)) for who, reasons in sorted(unused.items())]
+    for who in sorted(unused.keys() - usable):
+        rows.append(("nothing usable", who, "; ".join(unused[who])))
     return dict(sorted(groups.items())), rows, labels
 
 
@@ -194,14 +197,6 @@ def read_owners(assignments: Path) -> dict[str, Owner]:
     stored = assignments / "submitted" / "owners.json"
     known = json.loads(stored.read_text("utf-8")) if stored.exists() else {}
     return {key: (number, name) for key, (number, name) in known.items()}
-
-
-def _label(about: dict[str, str], roster: list[dict[str, str]]) -> str:
-    """Return how a student is listed: the id in the roster, the folder, or the name and number."""
-    student = _student(about, roster)
-    if student in {row["id"] for row in roster}:
-        return student
-    return about["folder"] or f"{about['name']} {about['id']}".strip()
 
 
 def _read_sets(assignments: Path) -> dict[str, list[NotebookNode]]:
