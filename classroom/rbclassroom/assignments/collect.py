@@ -13,7 +13,7 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator
 from datetime import datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import nbformat
 from nbformat import NotebookNode
@@ -27,17 +27,6 @@ LISTS += ["nothing usable", "not on the roster", "missing"]
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
 Group = tuple[str, str, str]  # a set, a student, and the student's number or folder in the LMS
 Owner = tuple[str, str]  # the number and the name of a student in the LMS
-
-
-class Upload(NamedTuple):
-    """An upload by a student; the greatest of several, by their first four fields, is used."""
-
-    number: int  # Canvas gives larger numbers to later uploads
-    date: str
-    prepared: bool  # whether the student's check wrote the file
-    file: str
-    about: dict[str, str]
-    content: bytes
 
 
 def collect(folder: Path, assignments: Path, due: datetime | None = None) -> list[Row]:
@@ -62,9 +51,9 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         rows += _renamed(f"{who}/{name}", owner, owners, submitted)
         owners[f"{who}/{name}"] = owner
         labels[who] = owner
-        rows += [("duplicates", other.file, f"{best.file} is used instead") for other in others]
+        rows += [("duplicates", other.label, f"{best.label} is used instead") for other in others]
         rows.append(_take(best, submitted / who / name))
-        if late := _why_late(best, due):
+        if late := _why_late(best.about, due):
             rows.append(("late", f"{who}, {name}", late))
         if roster and who not in ids:
             rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
@@ -104,18 +93,21 @@ def read_report(assignments: Path) -> list[dict[str, str]]:
 
 def _grouped(
     folder: Path, sets: dict[str, list[NotebookNode]], roster: list[dict[str, str]]
-) -> tuple[dict[Group, list[Upload]], list[Row], dict[str, Owner]]:
-    """Return the uploads of each student for each set, the best one last, and further rows.
+) -> tuple[dict[Group, list[File]], list[Row], dict[str, Owner]]:
+    """Return the notebooks of each student for each set, the best one last, and further rows.
 
     The rows are for the other files, and for students without a notebook. The last result has the
     number and the name of all students, by their labels.
     """
-    groups = defaultdict[Group, list[Upload]](list)
+    groups = defaultdict[Group, list[File]](list)
     unused = defaultdict[str, list[str]](list)  # the files of each student that are not used
     ids, usable = {row["id"] for row in roster}, set[str]()  # usable: students with a notebook
     files, rows, labels = list(find_files(folder)), list[Row](), dict[str, Owner]()
-    found = ["" if file.kind else _set_of(file, sets) for file in files]
-    for file, name, about in zip(files, found, find_owners(files, found), strict=True):
+    for file in files:
+        file.of_set = "" if file.kind else _set_of(file, sets)
+    find_owners(files)
+    for file in files:
+        name, about = file.of_set, file.about
         if not about:
             why = file.why or "neither its name nor a folder names a student"
             rows.append((file.kind or "unmatched", file.label, why))
@@ -129,19 +121,23 @@ def _grouped(
         elif named and name not in named:
             why = f"its name is {named[0]}, its cells are of {name}"
         else:
-            prepared, first = "/to_submit/" in f"/{about['file']}", int(about["number"] or 0)
-            upload = Upload(first, about["date"], prepared, file.label, about, file.content)
-            number = about["id"] or about["folder"] or about["name"]
-            groups[name, student, number].append(upload)
+            groups[name, student, about["id"] or about["folder"] or about["name"]].append(file)
             usable.add(label)
             continue
         rows.append((file.kind or "unmatched", file.label, why))
         unused[label].append(f"{file.label}: {why}")
-    for uploads in groups.values():
-        uploads.sort(key=lambda upload: upload[:4])
+    for notebooks in groups.values():
+        notebooks.sort(key=_rank)
     for who in sorted(unused.keys() - usable):
         rows.append(("nothing usable", who, "; ".join(unused[who])))
     return dict(sorted(groups.items())), rows, labels
+
+
+def _rank(file: File) -> tuple[int, str, bool, str]:
+    """Order the notebooks of a student for a set; the last one is used."""
+    prepared = "/to_submit/" in f"/{file.about['file']}"  # the student's check wrote the file
+    # Canvas gives larger numbers to later uploads
+    return int(file.about["number"] or 0), file.about["date"], prepared, file.label
 
 
 def _namesakes(groups: Iterable[Group], submitted: Path) -> Iterator[Row]:
@@ -181,15 +177,15 @@ def _renamed(key: str, owner: Owner, owners: dict[str, Owner], submitted: Path) 
         yield "renamed", f"submitted/{old}", f"is {who}, {name}"
 
 
-def _why_late(best: Upload, due: datetime | None) -> str:
+def _why_late(about: dict[str, str], due: datetime | None) -> str:
     """Return why an upload is late, or ""."""
-    if best.about.get("late"):
+    if about["late"]:
         return "Canvas marks it as late"
-    if not due or best.about["number"] or best.date <= written(due):
+    if not due or about["number"] or about["date"] <= written(due):
         return ""
-    if best.about["exact"]:
-        return f"handed in at {best.date}"
-    return f"perhaps: {best.date} may be the date of the download; look in Moodle"
+    if about["exact"]:
+        return f"handed in at {about['date']}"
+    return f"perhaps: {about['date']} may be the date of the download; look in Moodle"
 
 
 def read_owners(assignments: Path) -> dict[str, Owner]:
@@ -261,22 +257,23 @@ def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
     return plain if alone else f"{plain}_{number}".strip("_") or "student"
 
 
-def _take(best: Upload, place: Path) -> Row:
+def _take(best: File, place: Path) -> Row:
     """Write an upload to its folder, unless a newer file is there; return a row for the report."""
+    date = best.about["date"]
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
     why = f"{place.parent.name}, {place.name}"
     if target.exists():
         # keep a file without a stamp, because it was not collected
         old = stamp.read_text(encoding="utf-8").strip() if stamp.exists() else "later"
-        if target.read_bytes() == best.content or best.date == old:
-            return "unchanged", best.file, why
-        if best.date < old:
-            return "duplicates", best.file, f"{why}: the file collected before is newer"
+        if target.read_bytes() == best.content or date == old:
+            return "unchanged", best.label, why
+        if date < old:
+            return "duplicates", best.label, f"{why}: the file collected before is newer"
         why += ": it replaces the file collected before"
     place.mkdir(parents=True, exist_ok=True)
     replace_file(target, best.content)
-    replace_file(stamp, f"{best.date}\n".encode())
-    return "collected", best.file, why
+    replace_file(stamp, f"{date}\n".encode())
+    return "collected", best.label, why
 
 
 def write_csv(path: Path, rows: list[dict[str, Any]]) -> None:

@@ -11,9 +11,10 @@ import re
 import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from rbclassroom.assignments.submissions import read_notebook
@@ -44,15 +45,18 @@ UNKNOWN = -1  # the level of a notebook that cannot be assigned to a student
 DEPTH = 4  # zips in zips
 
 
-class File(NamedTuple):
+@dataclass
+class File:
     """A file in a download, which holds a notebook if `kind` is empty."""
 
     parts: tuple[str, ...]  # the folders, zips and names on its path
     dates: tuple[datetime | None, ...]  # of the parts that are files or zips
     label: str
-    kind: str  # of the row in the report
-    why: str
+    kind: str = ""  # of the row in the report
+    why: str = ""
     content: bytes = b""
+    of_set: str = ""  # the set of a notebook
+    about: dict[str, str] = field(default_factory=dict)  # the student: name, id and so on
 
 
 def find_files(folder: Path) -> Iterator[File]:
@@ -66,7 +70,7 @@ def find_files(folder: Path) -> Iterator[File]:
         elif path.is_file():
             try:
                 with path.open("rb") as stream:
-                    yield from _look(File(parts, dates, label, "", ""), stream, [DOWNLOAD_BYTES])
+                    yield from _look(File(parts, dates, label), stream, [DOWNLOAD_BYTES])
             except OSError as error:
                 yield File(parts, dates, label, "refused", str(error.strerror))
 
@@ -76,23 +80,24 @@ def _look(file: File, stream: IO[bytes], room: list[int], depth: int = 0) -> Ite
     suffix = Path(file.parts[-1]).suffix.lower()
     try:
         if JUNK.search("/" + "/".join(file.parts)):
-            yield file._replace(kind="ignored", why="it is not a file to submit")
+            file.kind, file.why = "ignored", "it is not a file to submit"
         elif suffix == ".zip" and depth == DEPTH:
             raise ValueError("it is a zip in too many zips; unpack it by hand")
         elif suffix == ".zip":
             with ZipFile(stream) as zipped:
                 yield from _look_into(zipped, file, room, depth)
+            return
         else:
             content = stream.read(FILE_BYTES + 1)
             if len(content) > FILE_BYTES:
                 raise ValueError("it is too large")
             read_notebook(content, "it")  # a browser may have added .json or .txt to its name
-            yield file._replace(content=content)
+            file.content = content
     except Exception as error:  # a damaged zip raises many kinds of errors
+        file.kind, file.why = "refused", str(error) or type(error).__name__
         if isinstance(error, ValueError) and suffix not in (".ipynb", ".zip"):
-            yield file._replace(kind="ignored", why="it is neither a notebook nor a zip")
-        else:
-            yield file._replace(kind="refused", why=str(error) or type(error).__name__)
+            file.kind, file.why = "ignored", "it is neither a notebook nor a zip"
+    yield file
 
 
 def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iterator[File]:
@@ -108,7 +113,7 @@ def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iter
         with contextlib.suppress(ValueError):  # some programs write no date
             when = datetime(*entry.date_time)
         dates = (*file.dates, *[None] * (len(inner) - 1), when)
-        found = File((*file.parts, *inner), dates, f"{file.label}: {name}", "", "")
+        found = File((*file.parts, *inner), dates, f"{file.label}: {name}")
         try:
             # one small block of bzip2 or LZMA can become gigabytes
             if entry.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
@@ -120,25 +125,25 @@ def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iter
             if room[0] < 0:
                 raise ValueError("the zip contains too many bytes; unpack it by hand")
         except Exception as error:  # a damaged zip raises many kinds of errors
-            yield found._replace(kind="refused", why=str(error) or type(error).__name__)
-            continue
-        yield from _look(found, io.BytesIO(content), room, depth + 1)
+            found.kind, found.why = "refused", str(error) or type(error).__name__
+            yield found
+        else:
+            yield from _look(found, io.BytesIO(content), room, depth + 1)
 
 
-def find_owners(files: list[File], found: list[str]) -> list[dict[str, str] | None]:
-    """Return for each file the name, the id and so on of its student, or None.
-
-    `found` has the set of each notebook.
-    """
+def find_owners(files: list[File]) -> None:
+    """Store what is known about the student of each file in `about`."""
     beside = defaultdict[tuple[str, ...], set[str]](set)  # the parts below each path
     for file in files:
         for at in range(len(file.parts) * (not file.kind)):
             beside[file.parts[:at]].add(file.parts[at])
-    owners = [_owner(file, beside) for file in files]
+    for file in files:
+        file.about = _owner(file, beside)
     # in the other downloads, one folder belongs to each student
-    named = {f.parts[0] for f, owner in zip(files, owners, strict=True) if owner and f.parts[1:]}
+    named = {f.parts[0] for f in files if f.about and f.parts[1:]}
     loose = {at: f.parts for at, f in enumerate(files) if f.parts[1:] and f.parts[0] not in named}
     notebooks = {at: parts for at, parts in loose.items() if not files[at].kind}
+    found = [file.of_set for file in files]
     levels = {at: k for at, k in _levels(notebooks, 0, found).items() if k != UNKNOWN}
     above = {parts[: levels[at]] for at, parts in notebooks.items() if at in levels}
     for at, parts in loose.items():
@@ -148,13 +153,9 @@ def find_owners(files: list[File], found: list[str]) -> list[dict[str, str] | No
             and levels.get(at, level) == level
             and (at in levels or files[at].kind)
         ):
-            about = {
-                "name": parts[level].removesuffix(".zip"),
-                "folder": "/".join(parts[: level + 1]),
-            }
-            about["file"] = "/".join(parts[level + 1 :])
-            owners[at] = _about(about, files[at], level)
-    return owners
+            name, folder = parts[level].removesuffix(".zip"), "/".join(parts[: level + 1])
+            about = {"name": name, "folder": folder, "file": "/".join(parts[level + 1 :])}
+            files[at].about = _about(about, files[at], level)
 
 
 def _levels(notebooks: dict[int, tuple[str, ...]], level: int, found: list[str]) -> dict[int, int]:
@@ -188,8 +189,8 @@ def _levels(notebooks: dict[int, tuple[str, ...]], level: int, found: list[str])
     return own | (deeper if classes else {})
 
 
-def _owner(file: File, beside: dict[tuple[str, ...], set[str]]) -> dict[str, str] | None:
-    """Return the data of a student in the names that an LMS gives, or None."""
+def _owner(file: File, beside: dict[tuple[str, ...], set[str]]) -> dict[str, str]:
+    """Return the data of a student in the names that an LMS gives, or an empty dictionary."""
     for pattern in CLEAR:
         if match := pattern.fullmatch("/".join(file.parts)):
             return _about(match.groupdict(), file, match["above"].count("/"))
@@ -205,7 +206,7 @@ def _owner(file: File, beside: dict[tuple[str, ...], set[str]]) -> dict[str, str
         if match and is_file and not whole and _is_class(file.parts[:at], siblings):
             name = "/".join(filter(None, (match["file"], rest)))
             return _about({**match.groupdict(), "file": name}, file, at)
-    return None
+    return {}
 
 
 def _is_class(above: tuple[str, ...], siblings: set[str]) -> bool:
