@@ -3,8 +3,6 @@
 import base64
 import io
 from collections.abc import Callable, Sequence
-from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -61,35 +59,6 @@ def png(picture: Image.Image, cuts: str = "") -> bytes:
     few_colours = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
     few_colours.save(content, "png", optimize=True, pnginfo=texts)
     return content.getvalue()
-
-
-def as_pdf(fig: Figure) -> bytes:
-    """Return a figure as a PDF, with the same bytes wherever Python and the fonts are.
-
-    Matplotlib sorts the fonts in a PDF by their paths, which depend on the folders of Python and of
-    this package. Here they are sorted by their file names, if Matplotlib is 3.11 or newer.
-    """
-    # the pages of the book have no fontTools, which this module loads
-    from matplotlib.backends.backend_pdf import PdfPages
-
-    pages: Any = PdfPages(content := io.BytesIO(), metadata={"CreationDate": None})
-    pages.savefig(fig)
-    with suppress(ImportError):
-        _sort_fonts(pages._ensure_file())
-    pages.close()
-    return content.getvalue()
-
-
-def _sort_fonts(file: Any) -> None:
-    """Sort the fonts of a PDF by their file names."""
-    from matplotlib.font_manager import FontPath
-
-    class Font(FontPath):
-        def __lt__(self, other: Any) -> bool:
-            return Path(self).name.casefold() < Path(other).name.casefold()
-
-    fonts = file._fontNames.items()
-    file._fontNames = {(Font(path, path.face_index), i): name for (path, i), name in fonts}
 
 
 def data_url(png: bytes) -> str:

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from rbcourse.draw.display import Display, Player
-from rbcourse.draw.pictures import as_pdf, data_url, drawn, png
+from rbcourse.draw.pictures import data_url, drawn, png
 from rbcourse.draw.space import scenes
 from rbcourse.files import replace_file
 
@@ -213,7 +213,9 @@ def write_figure(
     if folder:
         files = {"csv": table.encode(), **pictures}
         if pdf:
-            files["pdf"] = as_pdf(fig)
+            content = io.BytesIO()
+            fig.savefig(content, format="pdf", metadata={"CreationDate": None})
+            files["pdf"] = content.getvalue()
         for ending, content in files.items():
             replace_file(folder / f"{name}.{ending}", content)
 

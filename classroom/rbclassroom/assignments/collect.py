@@ -64,8 +64,9 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
                 who = f"{row.get('first_name', '')} {row.get('last_name', '')}".strip()
                 rows.append(("missing", f"{row['id']}, {name}", who))
     # before there was a roster, the label was made from the name and the number
-    students = {*labels, *(f"{name} {number}".strip() for number, name in labels.values())}
-    before = [row for row in read_report(assignments) if _still_holds(row, names, students)]
+    seen = {*labels, *(f"{name} {number}".strip() for number, name in labels.values())}
+    seen |= {what for _, what, _ in rows}
+    before = [row for row in read_report(assignments) if _still_holds(row, names, seen)]
     now = [dict(zip(("list", "what", "why"), row, strict=True)) for row in rows]
     lines = [*before, *(row | {"sets": " ".join(names)} for row in now)]
     owners |= {what: labels[what] for kind, what, _ in rows if kind == "nothing usable"}
@@ -75,12 +76,17 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     return rows
 
 
-def _still_holds(row: dict[str, str], names: list[str], students: Collection[str]) -> bool:
-    """Tell whether a row of an earlier run is about other sets, or about another student."""
-    if not {*row["sets"].split()} & {*names}:
+def _still_holds(row: dict[str, str], names: list[str], seen: Collection[str]) -> bool:
+    """Tell whether a row of an earlier run is about other sets, or about another student.
+
+    `seen` has the students and the files of this run. A row without sets is from a run that found
+    no set.
+    """
+    sets, student = row["sets"].split(), row["what"].partition(", ")[0]
+    if sets and not {*sets} & {*names}:
         return True
-    student = row["what"].partition(", ")[0]
-    return row["list"] in ("late", "nothing usable") and student not in students
+    lasting = row["list"] in ("late", "nothing usable") or not sets
+    return lasting and not {student, row["what"]} & {*seen}
 
 
 def read_report(assignments: Path) -> list[dict[str, str]]:
