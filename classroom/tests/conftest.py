@@ -51,6 +51,25 @@ def few_states(request):
         yield
 
 
+@pytest.fixture(scope="session")
+def template(tmp_path_factory):
+    from tiny_class import make_template
+
+    return make_template(tmp_path_factory.mktemp("template"))
+
+
+@pytest.fixture(scope="session")
+def release(tmp_path_factory):
+    """Return the tiny set as it is handed out."""
+    from tiny_set import write_tiny_set
+
+    from rbclassroom.assignments import handout
+
+    folder = tmp_path_factory.mktemp("assignments")
+    write_tiny_set(folder)
+    return handout.release("ps0", folder)["ps0.ipynb"].decode()
+
+
 @cache
 def recorded_briefly(name):
     from rbclassroom.explorers import recorded

@@ -14,17 +14,9 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 from tiny_set import answered, cell, write_tiny_set
 
-from rbclassroom.assignments import check, handout
+from rbclassroom.assignments import check
 from rbclassroom.assignments.autograding import BoxedExecute
 from rbclassroom.assignments.locked_cells import grade_id
-
-
-@pytest.fixture(scope="module")
-def release(tmp_path_factory):
-    """Return the tiny set as it is handed out."""
-    folder = tmp_path_factory.mktemp("assignments")
-    write_tiny_set(folder)
-    return handout.release("ps0", folder)["ps0.ipynb"].decode()
 
 
 @pytest.fixture
@@ -150,13 +142,12 @@ def test_an_endless_loop_and_a_dead_kernel_are_reported(hand_in, capsys, endless
 
 
 def test_exit_and_input_are_reported_in_their_cells(hand_in, capsys):
-    check.check(hand_in(square="def square(x):\n    return x * x\ninput()", half="exit()"))
+    asks = "def square(x):\n    return x * int(input())\ninput()"
+    check.check(hand_in(square=asks, half="exit()"))
     said = capsys.readouterr().out
+    assert said.count("input() has no answer here") == 2
     assert "the kernel died in cell 5: the code called exit" in said
     assert "cell 5 was not run to its end" in said
-    path = hand_in(square="def square(x):\n    return x * int(input())")
-    check.check(path)
-    assert "input() has no answer here" in capsys.readouterr().out
 
 
 @pytest.mark.skipif(os.name == "nt", reason="interrupts are not signals on Windows")
@@ -231,23 +222,18 @@ def test_a_missing_original_is_made_from_its_source(hand_in, tmp_path, monkeypat
 
 
 def test_a_cell_that_stops_after_its_function_passes_as_in_grading(hand_in, capsys):
-    right = "def square(x):\n    return x * x\n"
-    check.check(hand_in(square=f"{right}1 / 0"))
+    check.check(hand_in(square="def square(x):\n    return x * x\n1 / 0"))
     said = capsys.readouterr().out
     assert "passed  A tiny set\n        cell 3 ZeroDivisionError: division by zero\n" in said
     assert "2 of 2 visible tests passed" in said
-    check.check(hand_in(square=right.replace("square", "squared")))
-    assert "name 'square' is not defined (cell 3 must define square.)" in capsys.readouterr().out
 
 
-def test_a_folder_stands_for_its_notebook(hand_in, capsys):
-    check.check(hand_in().parent)
-    assert "2 of 2 visible tests passed" in capsys.readouterr().out
-
-
-def test_a_syntax_error_is_reported_without_a_number_as_its_file(hand_in, capsys):
-    check.check(hand_in(square="def square(x)\n    return x"))
-    assert "SyntaxError: expected ':' (line 1)" in capsys.readouterr().out
+def test_functions_with_a_wrong_name_and_syntax_errors_are_reported(hand_in, capsys):
+    path = hand_in(square="def squared(x):\n    return x * x", half="if 1\n    half = 0.5")
+    check.check(path.parent)  # a folder stands for its notebook
+    said = capsys.readouterr().out
+    assert "name 'square' is not defined (cell 3 must define square.)" in said
+    assert "SyntaxError: expected ':' (line 1)" in said
 
 
 def test_errors_are_reported_even_if_their_output_is_lost():

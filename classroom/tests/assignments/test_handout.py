@@ -67,8 +67,8 @@ def test_the_wheels_are_installed_from_the_unpacked_folder(unpacked, tmp_path):
     assert place.startswith(str(tmp_path))
 
 
-def test_the_handout_has_the_same_bytes_each_time(course):
-    path = make_handout("ps0", course, ROOT)
+def test_the_handout_has_the_same_bytes_each_time(course, unpacked):
+    path = course / "handouts" / "ps0.zip"
     before = path.read_bytes()
     path.unlink()
     assert make_handout("ps0", course, ROOT).read_bytes() == before

@@ -7,23 +7,14 @@ import re
 import nbformat
 import numpy as np
 import pytest
-from tiny_set import ANSWERS, answered, cell, write_tiny_set
+from tiny_set import ANSWERS, answered, cell
 
-from rbclassroom.assignments import handout
 from rbclassroom.assignments.locked_cells import grade_id
 from rbclassroom.assignments.submissions import Refused, count_found, read_notebook, restore
 
 TITLE, IMPORTS, SQUARE, SQUARE_TEST, HALF, HALF_TEST, QUESTION, WORDS = range(8)
 STUB = "# YOUR CODE HERE\nraise NotImplementedError()"
 GOOD = {**ANSWERS, "words-answer": "It is: 2 × 2 > 0."}
-
-
-@pytest.fixture(scope="module")
-def release(tmp_path_factory):
-    """Return the tiny set as it is handed out."""
-    folder = tmp_path_factory.mktemp("assignments")
-    write_tiny_set(folder)
-    return handout.release("ps0", folder)["ps0.ipynb"].decode()
 
 
 def markdown(source, **fields):
@@ -49,18 +40,9 @@ def without_marks(each, at=0):
     each["metadata"] = {}
 
 
-def without_ids(each, at=0):
-    each.pop("id")
-
-
-def without_marks_and_ids(each, at=0):
-    each["metadata"] = {}
-    each.pop("id")
-
-
-def code_without_marks(each, at):
-    if each["cell_type"] == "code":
-        each["metadata"] = {}
+def without_fields(each, at=0):
+    for key in ("id", "outputs", "execution_count"):
+        each.pop(key, None)
 
 
 def from_colab(each, at):
@@ -70,15 +52,6 @@ def from_colab(each, at):
 def from_deepnote(each, at):
     each["metadata"] = {"cell_id": f"0{at}-abc", "deepnote_cell_type": each["cell_type"]}
     each |= {"id": f"{at:032x}", "block_group": "x"}
-
-
-def from_nteract(each, at):
-    each["metadata"] |= {"inputHidden": False, "outputHidden": True}
-    each["outputExpanded"] = False
-
-
-def from_kaggle(each, at):
-    each["metadata"] |= {"_uuid": "8f2839f25d086af736a60e9eeb907d3b93b6e0e5", "trusted": True}
 
 
 def as_version_3(notebook):
@@ -93,51 +66,30 @@ def as_version_3(notebook):
 
 
 def as_version_5(notebook):
-    notebook |= {"nbformat": 5, "nbformat_minor": 0, "language": "python"}
-
-
-def without_fields(each, at):
-    for key in ("outputs", "execution_count"):
-        each.pop(key, None)
+    notebook |= {"nbformat": 5, "nbformat_minor": 0, "language": "python", "signature": "abc"}
+    notebook["metadata"] = {"kernelspec": {"name": 3}, "widgets": None}
 
 
 def without_types(each, at):
     del each["cell_type"]
 
 
-def with_odd_outputs(each, at):
+def with_odd_fields(each, at):
+    """Add fields of nteract and Kaggle, and fields that are not valid."""
+    each["metadata"] |= {"inputHidden": False, "_uuid": "8f2839", "trusted": True, "editable": True}
+    each |= {"outputExpanded": False, "id": "a b/ü" * 30 + str(at % 2)}
+    each["attachments"] = {"a.png": "x", "b.png": None}
     if each["cell_type"] == "code":
         image = {"output_type": "display_data", "data": {"image/png": ["iVBO", "Rw"], "x": {}}}
         each |= {"outputs": [image, {"output_type": "pyout"}, None], "execution_count": "7"}
-
-
-def with_odd_metadata(notebook):
-    notebook["metadata"] = {"kernelspec": {"name": 3}, "widgets": None}
-    notebook["signature"] = "abc"
-
-
-def with_odd_ids(each, at):
-    each["id"] = "a b/ü" * 30 + str(at % 2)
-
-
-def as_one_line(each, at):
-    each["source"] = "".join(each["source"])
 
 
 def as_lines_without_ends(each, at):
     each["source"] = "".join(each["source"]).split("\n")
 
 
-def with_crlf(each, at):
-    each["source"] = [line.replace("\n", "\r\n") for line in each["source"]]
-
-
-def with_spaces(each, at):
-    each["source"] = [line.replace("\n", "  \n") for line in each["source"]] + ["\n"]
-
-
-def unlocked(each, at):
-    each["metadata"] |= {"editable": True, "deletable": True}
+def with_crlf_and_spaces(each, at):
+    each["source"] = [line.replace("\n", "  \r\n") for line in each["source"]] + ["\r\n"]
 
 
 def text(each):
@@ -197,12 +149,6 @@ def in_order(*changes):
     return change
 
 
-def in_question(notebook):
-    question, answer = notebook["cells"][QUESTION], notebook["cells"][WORDS]
-    question["source"] = f"{text(question)}\n\n{text(answer)}"
-    answer["source"] = "YOUR ANSWER HERE"
-
-
 def added(place, cell):
     return lambda notebook: notebook["cells"].insert(place, cell)
 
@@ -255,41 +201,25 @@ CHANGED = "was changed; it is restored"
 # The changes that a human reader overlooks: each answer is found. A row has a change, the number
 # of added cells that stay, and parts of the remarks.
 FOUND = {
-    "code cells without metadata": (of_every_cell(code_without_marks), 0, ["5 cells have lost"]),
     "no metadata": (of_every_cell(without_marks), 0, [LOST]),
-    "no ids": (of_every_cell(without_ids), 0, []),
-    "no metadata and no ids": (of_every_cell(without_marks_and_ids), 0, ["5 cells", *[ADDED] * 3]),
+    "no ids and no outputs": (of_every_cell(without_fields), 0, []),
     "Colab": (of_every_cell(from_colab), 0, [LOST]),
     "Deepnote": (of_every_cell(from_deepnote), 0, ["5 cells", *[ADDED] * 3]),
-    "nteract": (of_every_cell(from_nteract), 0, []),
-    "Kaggle": (of_every_cell(from_kaggle), 0, []),
     "version 3": (as_version_3, 0, []),
     "version 5": (as_version_5, 0, []),
-    "no outputs": (of_every_cell(without_fields), 0, []),
     "no types": (of_every_cell(without_types), 0, []),
-    "odd outputs": (of_every_cell(with_odd_outputs), 0, []),
-    "odd metadata": (with_odd_metadata, 0, []),
-    "odd ids": (of_every_cell(with_odd_ids), 0, []),
-    "sources as one line": (of_every_cell(as_one_line), 0, []),
+    "odd fields": (of_every_cell(with_odd_fields), 0, []),
     "lines without ends": (of_every_cell(as_lines_without_ends), 0, []),
-    "ends of lines of Windows": (of_every_cell(with_crlf), 0, []),
-    "spaces": (of_every_cell(with_spaces), 0, []),
-    "unlocked": (of_every_cell(unlocked), 0, []),
+    "ends of lines of Windows": (of_every_cell(with_crlf_and_spaces), 0, []),
     "answer merged into its test": (merged(SQUARE, 1), 0, [CHANGED, ADDED]),
     "test merged into its answer": (merged(SQUARE, 0), 0, ["was missing"]),
     "answer merged into the test above": (merged(SQUARE_TEST, 0), 0, [CHANGED, ADDED]),
     "test merged into the answer below": (merged(SQUARE_TEST, 1), 0, ["was missing"]),
     "words merged into the question": (merged(QUESTION, 0), 0, [CHANGED, ADDED]),
     "question merged into the words": (merged(QUESTION, 1), 0, ["was missing"]),
-    "words in the question": (in_question, 0, [CHANGED, ADDED]),
     "split function": (split(SQUARE, "(x):\n"), 0, ["was split"]),
-    "split function without marks": (
-        in_order(split(SQUARE, "(x):\n"), of_every_cell(without_marks)),
-        0,
-        ["was split", "8 cells"],
-    ),
     "split function without marks and ids": (
-        in_order(split(SQUARE, "(x):\n"), of_every_cell(without_marks_and_ids)),
+        in_order(split(SQUARE, "(x):\n"), of_every_cell(from_deepnote)),
         0,
         ["5 cells", *[ADDED] * 3],
     ),
@@ -303,7 +233,6 @@ FOUND = {
         ["is a copy; another one counts"],
     ),
     "function in an added cell below": (in_added_cell(SQUARE, SQUARE + 1, SQUARE_STUB), 0, [ADDED]),
-    "function in an added cell above": (in_added_cell(SQUARE, SQUARE, SQUARE_STUB), 0, [ADDED]),
     "function in the last cell": (in_added_cell(SQUARE, 8, SQUARE_STUB), 0, [ADDED]),
     "number in an added cell": (in_added_cell(HALF, HALF + 1), 0, [ADDED]),
     "words in an added cell": (in_added_cell(WORDS, 8, "YOUR ANSWER HERE"), 0, [ADDED]),
@@ -312,15 +241,9 @@ FOUND = {
         0,
         [ADDED] * 2,
     ),
-    "no tests": (removed(SQUARE_TEST, HALF_TEST), 0, ["was missing"] * 2),
-    "no title and no question": (removed(TITLE, QUESTION), 0, ["was missing"] * 2),
-    "no tests and no metadata": (
-        in_order(removed(SQUARE_TEST), of_every_cell(without_marks)),
-        0,
-        ["7 cells", "was missing"],
-    ),
+    "no locked cells": (removed(TITLE, SQUARE_TEST, QUESTION), 0, ["was missing"] * 3),
     "answers as Markdown": (made("markdown", SQUARE, HALF), 0, ["was made a markdown cell"] * 2),
-    "answers as raw cells": (made("raw", SQUARE, WORDS), 0, ["was made a raw cell"] * 2),
+    "raw cells": (made("raw", SQUARE, SQUARE_TEST, WORDS), 0, ["was made a raw cell"] * 3),
     "note that begins with a blank": (added(SQUARE + 1, markdown("  - a note")), 1, []),
     "code that begins with blanks": (added(SQUARE + 1, code("  square(3)")), 1, []),
     "marked note below": (copied(SQUARE, SQUARE + 1, "See above.", "markdown"), 1, ["is a copy"]),
@@ -358,16 +281,12 @@ FOUND = {
         0,
         ["1 cells have lost", "each was missing"],
     ),
-    "test as a raw cell": (made("raw", SQUARE_TEST), 0, ["was made a raw cell; it is restored"]),
     "half of a locked text": (stubbed(IMPORTS, "import math\n\nimport math"), 0, [CHANGED]),
-    "points": (marked(points=20), 0, ["has other points or marks; it is restored"]),
-    "marks": (marked(grade=False), 0, ["has other points or marks; it is restored"]),
+    "points": (marked(points=20, grade=False), 0, ["has other points or marks; it is restored"]),
     "moved to the end": (moved, 0, ["not in the order"]),
 }
 FILES = {
-    "a byte order mark": lambda text: text.encode("utf-8-sig"),
     "UTF-16": lambda text: text.encode("utf-16"),
-    "UTF-16 without a mark": lambda text: text.encode("utf-16-le"),
     "Windows-1252": lambda text: text.encode("cp1252"),
 }
 
@@ -434,17 +353,6 @@ def test_a_damaged_letter_is_replaced_and_its_cell_is_named(release):
     assert remarks == [f"cell 2, added cell {title} {end}", f"cell 9, answer {title} {end}"]
 
 
-def test_pictures_in_answers_are_kept(release):
-    def change(notebook):
-        notebook["cells"][WORDS]["attachments"] = {"a.png": {"image/png": "iVBO"}}
-        split(WORDS, "It is: ")(notebook)
-        notebook["cells"][WORDS]["attachments"] = {"b.png": {"image/png": "iVBO"}}
-
-    notebook, _ = restored(release, json.dumps(submitted(release, change)).encode())
-    assert cell(notebook, "words-answer").source == "It is: \n2 × 2 > 0."
-    assert cell(notebook, "words-answer").attachments.keys() == {"a.png", "b.png"}
-
-
 def test_pictures_with_one_name_and_in_other_cells_are_kept(release):
     """JupyterLab names every pasted picture image.png."""
 
@@ -462,13 +370,6 @@ def test_pictures_with_one_name_and_in_other_cells_are_kept(release):
     names = re.findall(r"attachment:([\w.-]+)", words.source)
     shown = [words.attachments[name]["image/png"] for name in names]
     assert shown == ["AAAA", "AAAA", "BBBB"]
-
-
-def test_odd_pictures_are_left_out(release):
-    def change(notebook):
-        notebook["cells"][WORDS]["attachments"] = {"a.png": "x", "b.png": None}
-
-    check_found(release, json.dumps(submitted(release, change)).encode())
 
 
 def test_a_very_deep_cell_is_kept(release):
@@ -534,7 +435,7 @@ def damaged(notebook, rng):
             copied(at, int(rng.integers(len(cells))))(notebook)
 
 
-@pytest.mark.parametrize("seed", range(200))
+@pytest.mark.parametrize("seed", range(100))
 def test_no_text_of_a_student_is_lost(release, seed):
     """Each word OWN… is in the restored notebook, and the cells of the set are complete."""
 

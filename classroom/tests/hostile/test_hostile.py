@@ -1,12 +1,11 @@
 """Grade malicious and broken submissions in one run; no other submission is affected."""
 
 import base64
-import codecs
 import contextlib
 import html
+import json
 import os
 import re
-import shutil
 import socket
 import tempfile
 import threading
@@ -17,10 +16,9 @@ import psutil
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from tiny_class import Class, begun
-from tiny_set import ANSWERS, cell
+from tiny_set import answered, cell
 
 import rbcourse
-from rbclassroom.assignments import grade as grading
 from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.grade import grade
 
@@ -68,6 +66,8 @@ SNEAKS = {
     "asks this machine": "import socket\nsocket.create_connection(('127.0.0.1', PORT), 5)",
     "asks by a socket": "import socket\nsocket.socket(socket.AF_UNIX).connect('COURSE/sock')",
     "becomes root": "import os\nos.setuid(0)",
+    "fills the disk": "with open('big', 'wb') as file:\n    for _ in range(3000):\n"
+    "        file.write(bytes(10**6))",
     "mounts": "import subprocess as s\ns.run(['mount', '-t', 'tmpfs', 'x', '/usr'], check=True)",
 }
 TRIED = f"""
@@ -78,17 +78,11 @@ for name, code in {SNEAKS!r}.items():
         print(f"{{name}}: {{type(error).__name__}}")
 """
 # These attacks use up a resource, and fail.
-GREEDY = {
-    "fills the disk": "with open('big', 'wb') as file:\n    for _ in range(3000):\n"
-    "        file.write(bytes(10**6))",
-    "starts too many": "import subprocess\nfor _ in range(500):\n"
-    "    subprocess.Popen(['sleep', 'SLEEP'], start_new_session=True)",
-    "forks": "import os, signal\nfor _ in range(10**4):\n"
-    "    if not os.fork():\n        signal.pause()",
-}
+TAKES = "bytearray(3 * 10**9)"
+FORKS = "import os, signal\nfor _ in range(10**4):\n    if not os.fork():\n        signal.pause()"
 # These attacks succeed only inside the sandbox. Each answer gets only the points that it earns.
-LOUD = {
-    "page": "from IPython.display import HTML, Javascript, SVG, display\n"
+SHOWS = (
+    "from IPython.display import HTML, Javascript, SVG, display\n"
     "display(HTML('<script>alert(1)</script><img src=x onerror=alert(2)>'\n"
     '\'<a href="javascript:alert(3)">x</a><iframe src="https://evil.example"></iframe>\'\n'
     "'<svg onload=alert(4)></svg><form action=\"https://evil.example\"><input></form>'\n"
@@ -99,13 +93,15 @@ LOUD = {
     "display({'image/png': '', 'text/plain': ''}, raw=True,\n"
     "    metadata={'filenames': {'image/png': 'https://evil.example/x.png'}})\n"
     "import os, subprocess\nprint(dict(os.environ))\nfor _ in range(50):\n"
-    "    subprocess.Popen(['setsid', 'sleep', 'SLEEP'], start_new_session=True)",
-    "prints": "print('x' * 3_000_000)",
-    "hides": "import os\nos.mkdir('a')\nos.symlink('COURSE/source', 'a/b')\nos.chmod('a', 0)\n"
-    "for _ in range(3000):\n    os.mkdir('d')\n    os.chdir('d')",
-    "kills": "import os, signal\ntry:\n    os.kill(-1, signal.SIGKILL)\n"
-    "except OSError as error:\n    print(error)",
-}
+    "    subprocess.Popen(['setsid', 'sleep', 'SLEEP'], start_new_session=True)\n"
+    "print('x' * 3_000_000)"
+)
+HIDES = (
+    "import os\nos.mkdir('a')\nos.symlink('COURSE/source', 'a/b')\nos.chmod('a', 0)\n"
+    "for _ in range(3000):\n    os.mkdir('d')\n    os.chdir('d')\n"
+    "import signal\ntry:\n    os.kill(-1, signal.SIGKILL)\nexcept OSError as error:\n"
+    "    print(error)"
+)
 # This answer tries to pass data to the next run: in a file, and in the kernel's keyring.
 TELLS = """
 import base64, linecache, platform
@@ -157,62 +153,51 @@ def write_words(notebook):
     notebook.cells.insert(3, new_code_cell("mine = 1", metadata=tagged))
 
 
-CELL_5 = "cell 5, answer of “A tiny set”"
-CHANGES = {"writes words": write_words, "forges remarks": forge_remarks}
-SQUARES = {"tells": TELLS, "raises": "def square(x):\n    raise SystemExit"}
-SQUARES["links"] = (
+CELL_3, CELL_5 = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tiny set”"
+HALF = "\nhalf = 0.5"
+EXITS = "def square(x):\n    raise SystemExit"
+LINKS = (
     "def square(x):\n"
     "    raise ValueError(r'$\\href{https://evil.example}{x}$ <script>alert(1)</script>')"
 )
-# Each row has a student, an answer, points (none if refused), and how the remark begins.
-OTHERS = [
-    ("tells", "half = 0.5", "2 1", ""),
-    ("writes words", "half = 0.5", "2 1", ""),
-    ("forges remarks", "half = 0.5", "2 1", "cell 2, locked cell of “A tiny set” was changed; it"),
-    ("raises", "half = 0.5", "0 1", ""),
-    ("links", "half = 0.5", "0 1", ""),
-    ("=cmd|' -C calc'!A0", "half = 1\n100.0", "2 0", ""),  # returns points
-    ("loops", f"{begun()}\nwhile True: pass", "2 0", f"{CELL_5}: stopped after"),
-    # The endless output is stopped when the time is over, or when the memory is full.
-    ("floods", f"{begun()}\nwhile True: print('x' * 9**4)", "2 0", f"{CELL_5}: "),
-    ("takes memory", "bytearray(3 * 10**9)", "2 0", f"{CELL_5}: takes too much memory"),
-    ("exits", "import os\nos._exit(0)", " ", f"Python ended in or before {CELL_5}"),
-    ("[ab]*", "half = 0.5", " ", "the name of the folder contains [, * or ?; rename the folder"),
+# The endless output is stopped when the time is over, or when the memory is full.
+LOOP, FLOOD = (f"{begun()}\nwhile True: {what}" for what in ("pass", "print('x' * 9**4)"))
+# Each row has a student, a change, answers, points (none if refused), and how the remark begins;
+# with None, every remark is accepted.
+CLASS = [
+    ("honest", None, {"half": HONEST + HALF}, "2 1", ""),
+    ("sneaks", None, {"half": TRIED + HALF}, "2 1", None),
+    ("hides", None, {"half": HIDES + HALF}, "2 1", None),
+    ("shows", None, {"half": SHOWS + HALF}, "2 1", f"{CELL_5}: the output is too large"),
+    ("tells", write_words, {"square": TELLS}, "2 1", ""),
+    ("forges", forge_remarks, {"square": LINKS}, "0 1", "cell 2, locked cell of “A tiny set” was"),
+    ("takes", None, {"square": TAKES, "half": FORKS}, "0 0", f"{CELL_3}: takes too much memory"),
+    ("loops", None, {"square": LOOP, "half": FLOOD}, "0 0", f"{CELL_3}: stopped after"),
+    # the answer to the second problem returns points
+    ("=cmd|' -C calc'!A0", None, {"square": EXITS, "half": "half = 1\n100.0"}, "0 0", ""),
+    ("[ab]*", None, {}, " ", "the name of the folder contains [, * or ?; rename the folder"),
 ]
-DAMAGED = "ps0.ipynb is damaged or not a notebook"
 FILES = [
-    ("crlf", lambda good: good.replace(b"\n", b"\r\n"), "2 1", ""),
-    ("bom", lambda good: codecs.BOM_UTF8 + good, "2 1", ""),
     ("utf-16", lambda good: good.decode().encode("utf-16"), "2 1", ""),
-    ("half a file", lambda good: good[:999], " ", DAMAGED),
-    ("deep", lambda good: b'{"cells": ' + b"[" * 10**5, " ", DAMAGED),
+    ("deep", lambda good: b'{"cells": ' + b"[" * 10**5, " ", "ps0.ipynb is damaged or not a note"),
     ("long", lambda good: b" " * 31_000_000, " ", "ps0.ipynb has more than 30,000,000 bytes"),
     ("more files", lambda good: good, " ", "the folder has more files than ps0.ipynb: remove feed"),
 ]
-RESULTS = [(student, *result) for student, _, *result in OTHERS + FILES]
+RESULTS = [(student, *result) for student, _, _, *result in CLASS]
+RESULTS += [(student, *result) for student, _, *result in FILES]
 RESULTS += [("a link", " ", "ps0.ipynb or a file or folder beside it is a link")]
-RESULTS += [("prints", "2 1", f"{CELL_5}: the output is too large")]
-RESULTS += [("honest", "2 1", ""), ("sneaks", "2 1", None)]
-RESULTS += [(student, "2 0", None) for student in GREEDY]
-RESULTS += [(student, "2 1", None) for student in LOUD if student != "prints"]
 
 
 def hand_in_all(course, port):
     places = {"COURSE": str(course.folder), "PACKAGE": str(Path(rbcourse.__file__).parent)}
     places |= {"HOME": str(Path.home()), "PORT": str(port), "SLEEP": SLEEP}
-
-    def placed(code):
-        return re.sub("|".join(places), lambda match: places[match[0]], code)
-
-    for name, code in {"honest": HONEST, "sneaks": TRIED, **GREEDY, **LOUD}.items():
-        course.submit(name, half=placed(code) + "\nhalf = 0.5" * (name not in GREEDY))
-    for name, half, *_ in OTHERS:
-        square = SQUARES.get(name, ANSWERS["square-answer"])
-        course.submit(name, CHANGES.get(name), square=square, half=half)
-    course.submit("good")
-    good = (course.folder / "submitted" / "good" / "ps0" / "ps0.ipynb").read_bytes()
-    for name, change, *_ in FILES:
-        course.submit_bytes(name, change(good))
+    for student, change, answers, *_ in CLASS:
+        for place, text in places.items():
+            answers = {name: code.replace(place, text) for name, code in answers.items()}
+        course.submit(student, change, **answers)
+    good = json.dumps(answered(course.given.decode())).encode()
+    for student, change, *_ in FILES:
+        course.submit_bytes(student, change(good))
     course.submit_bytes("more files", b"<script>", "feedback.html")
     place = course.folder / "submitted" / "a link" / "ps0"
     place.mkdir(parents=True)
@@ -251,7 +236,7 @@ def state(folder):
 
 @pytest.mark.parametrize(("student", "wanted", "remark"), RESULTS)
 def test_each_submission_gets_the_expected_points_and_remark(course, student, wanted, remark):
-    """Large outputs cost no points. If a row gives None as the remark, any text is accepted."""
+    """Large outputs cost no points."""
     row = course.rows()["'" * student.startswith("=") + student]
     assert f"{row['square-test']} {row['half-test']}" == wanted, row
     assert row["remarks"].isprintable()
@@ -264,12 +249,12 @@ def test_each_submission_gets_the_expected_points_and_remark(course, student, wa
 
 def test_attempts_to_leave_the_sandbox_fail(course):
     errors = {}
-    for student in ("sneaks", *GREEDY):
+    for student in ("sneaks", "takes"):
         answer = cell(nbformat.read(course.graded(student), as_version=4), "half-answer")
         for output in answer.outputs:
             errors |= dict(line.split(": ") for line in output.get("text", "").splitlines())
             errors[student] = output.get("ename", "OSError")
-    assert errors.keys() >= {*SNEAKS, *GREEDY}
+    assert errors.keys() == {*SNEAKS, "sneaks", "takes"}
     assert {*errors.values()} <= REFUSALS, errors
 
 
@@ -294,7 +279,7 @@ def test_feedback_pages_contain_no_active_content_of_students(pages):
         loaded = re.findall(r"\s(?:src|href)=\"([^\"]*)\"", tags)
         assert all(address.startswith(("data:image/", "#")) for address in loaded), student
         assert r"\href" not in html.unescape(body.split('class="notebook"')[0]), student
-    words = pages["writes words"]
+    words = pages["tells"]
     for shown in (">A tiny set</h1>", "$a &lt; b$", PIXEL, r"$\text{https://evil.example}{x}$"):
         assert shown in words
     assert r"\href" not in html.unescape(words)
@@ -309,32 +294,3 @@ def test_feedback_pages_show_no_hidden_test(pages):
             for shown in (line, line[::-1], *codes):
                 assert shown not in text, student
         assert SECRET not in page
-
-
-def test_points_written_by_a_submission_are_detected(tmp_path, template, monkeypatch):
-    """A submission gives itself points above the maximum, or changes another student's points."""
-    graded = Class(tmp_path / "ann", template)
-    graded.submit("ann")
-    grade(["ps0"], graded.folder)
-    plain = grading.wait
-    monkeypatch.setattr(grading, "WORKERS", 1)
-    for who, said in (
-        ("bob", "bob has .* points"),
-        ("ann", "The points of ann changed during the grading of bob"),
-    ):
-        course = Class(tmp_path / f"by bob, of {who}", (graded.folder, template[1]))
-        shutil.rmtree(course.folder / "submitted" / "ann")
-        course.submit("bob")
-
-        def harmed(works, course=course, who=who, **how):
-            found = plain(works, **how)
-            with course.gradebook() as gradebook:
-                gradebook.find_grade("half-test", "ps0", "ps0", who).manual_score = 56
-                gradebook.db.commit()
-            return found
-
-        monkeypatch.setattr(grading, "wait", harmed)
-        with pytest.raises(ValueError, match=said):
-            grade(["ps0"], course.folder)
-        assert "bob" not in course.rows()  # this is the table of the first grading
-        assert (course.folder / "gradebook.before-ps0.db").exists()
