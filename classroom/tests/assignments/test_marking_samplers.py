@@ -48,10 +48,8 @@ def test_right_samplers_are_refused_less_often_than_once_in_a_million(law):
     assert DELTA <= 1e-6
 
 
-@pytest.mark.parametrize("name", ["PCG64", "MT19937", "Philox", "SFC64"])
-def test_a_right_sampler_is_accepted_with_any_generator(name, capsys):
-    rng = np.random.Generator(getattr(np.random, name)(5))
-    assert COIN.accepts(student("def answer(rng): return rng.random()"), rng)
+def test_a_right_sampler_is_accepted(capsys):
+    assert COIN.accepts(student("def answer(rng): return rng.random()"), 5)
     assert capsys.readouterr().out == "The 4000 draws agree with the distribution that is wanted.\n"
 
 

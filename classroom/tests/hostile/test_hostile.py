@@ -52,13 +52,11 @@ HONEST = (
 # All these attacks have to fail. One student makes them, and prints the error of each of them.
 SNEAKS = {
     "reads the set": "print(open('COURSE/source/ps0/ps0.ipynb').read())",
-    "reads others": "import os\nprint(os.listdir('COURSE/submitted'))",
     "reads home": "import os\nassert len(os.listdir('HOME')) > 1",
     "finds the set": "import os\nfound = [f for _, _, names in os.walk('/') for f in names]\n"
     "assert 'ps0.ipynb' in found",
     "writes the gradebook": "import sqlite3\nbook = sqlite3.connect('COURSE/gradebook.db')\n"
     "book.execute('update grade set manual_score = 56')\nbook.commit()",
-    "writes to the course": "open('COURSE/source/mine', 'w')",
     "writes to the package": "open('PACKAGE/mine.py', 'w')",
     "writes to the disk": "open('/usr/mine', 'w')",
     "writes to memory": "open('/dev/mine', 'w')",
