@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from glob import glob
 from pathlib import Path
 from zipfile import ZipFile
@@ -46,11 +46,6 @@ def tamper(notebook):
     for name in ("square-test", "imports"):
         notebook.cells.remove(cell(notebook, name))
     notebook.cells.append(copied)
-
-
-def strip_metadata(notebook):
-    for found in notebook.cells:
-        found.metadata = {}
 
 
 WARNS = "import warnings\ndef square(x):\n    warnings.warn('old')\n    return x * x"
@@ -93,18 +88,11 @@ SQUARE, HALF = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tin
 # Each row has a student, a change, answers, points (none if refused), and parts of the remarks.
 CLASS = [
     ("good one", None, {"square": WARNS}, "2 1", []),
-    (
-        "tampers",
-        tamper,
-        {"half": "half = 3"},
-        "2 0",
-        ["is a copy; another one counts", "more"],
-    ),
+    ("tampers", tamper, {"half": "half = 3"}, "2 0", ["is a copy; another one counts", "more"]),
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),
     ("nosy", None, {"square": NOSY}, "0 1", []),
     ("dies", None, {"half": DIES}, " ", [f"Python ended in or before {HALF}, or 600 s were over"]),
-    ("stripped", strip_metadata, {}, "2 1", ["8 cells have lost the marks of nbgrader"]),
 ]
 FILES = [
     ("pdf", "ps0.ipynb", b"%PDF-1.7 \xff", "ps0.ipynb is a PDF or an archive, not a notebook"),
@@ -267,7 +255,9 @@ def test_points_written_by_a_submission_are_detected(tmp_path, course, monkeypat
             with harmed.gradebook() as gradebook:
                 gradebook.find_grade("half-test", "ps0", "ps0", who).manual_score = 56
                 gradebook.db.commit()
-            return super().submit(list)
+            done = Future()
+            done.set_result([])
+            return done
 
     monkeypatch.setattr(grading, "ProcessPoolExecutor", Cheating)
     with pytest.raises(ValueError, match=said):
