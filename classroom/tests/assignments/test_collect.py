@@ -544,3 +544,15 @@ def test_facts_about_a_set_survive_the_collection_of_another(course):
     shutil.rmtree(folder)
     collected(course, {"three.zip": packed({moodle("Dee_4"): answered(course)})})
     assert kept() == late[:1]
+
+
+def test_rows_of_a_run_without_any_set_are_replaced(course):
+    bad = {moodle("Bob_1"): b"", moodle("Carol_2"): b""}
+    for _ in range(2):
+        rows = collected(course, bad)
+        assert len(read_report(course)) == len(rows) == 4
+    (course.parents[1] / "downloads" / moodle("Carol_2")).unlink()
+    collected(course, {moodle("Bob_1"): answered(course)})
+    left = [(row["list"], row["what"]) for row in read_report(course)]
+    assert ("nothing usable", "Bob 1") not in left
+    assert ("nothing usable", "Carol 2") in left

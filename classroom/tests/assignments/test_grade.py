@@ -18,7 +18,6 @@ from zipfile import ZipFile
 import nbformat
 import psutil
 import pytest
-from nbformat.v4 import new_code_cell, new_output
 from tiny_class import Class, begun
 from tiny_set import cell, write_tiny_set
 from traitlets.config import Config
