@@ -1,4 +1,4 @@
-"""Test that all functions that make curves keep the contract, and that its checks detect faults.
+"""Test that all functions that make curves keep the contract.
 
 The functions, their options and their groups come from the package: a function of `rbcourse` or of
 `closed_forms` that has the parameters `start` and `goal` is tested here without an edit.
@@ -9,8 +9,7 @@ import itertools
 import math
 import pickle
 import typing
-from copy import copy
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import cache, partial
 
 import numpy as np
@@ -68,7 +67,7 @@ def needed(function):
 
 
 def makers():
-    """Return a dict of all functions, with each option, for both groups."""
+    """Return a dict of all functions, with each option."""
     found = {}
     for name, function in FUNCTIONS.items():
         for option in [
@@ -76,7 +75,8 @@ def makers():
             *(key for key in OPTIONS if key in inspect.signature(function).parameters),
         ]:
             options = sorted({*needed(function), option} - {None})
-            for size in {3, 4} - {REFUSED.get(name)}:
+            sizes = {3, 4} if option in (None, "body") else {3}  # others change the rotation alone
+            for size in sizes - {REFUSED.get(name)}:
                 found["-".join([name, *options, str(size)])] = Maker(function, size, *options)
     return found
 
@@ -106,26 +106,24 @@ def frame(group, seed, *, shifted=True):
     return (A, rb.adjoint_se3(A)) if group == 4 else (A[:3, :3], A[:3, :3])
 
 
-def moved(make, start, goal, v0, v1):
-    """Return the curve with these ends as a curve that is moved; its body is not a ball."""
+def moved(start, goal, v0, v1):
+    """Return the cubic with these ends as a curve that is moved; its body is not a ball."""
     group = start.shape[-1]
     (L, _), (X, old) = frame(group, 5), frame(group, 6)
     start, goal = (np.linalg.inv(L) @ A @ np.linalg.inv(X) for A in (start, goal))
     body = rb.Body(np.diag([1.0, 1.2, 1.5]), MASS, CENTRE)
-    return make(start, goal, v0 @ old.T, v1 @ old.T, body=body).moved(L, X)
+    return cubic(start, goal, v0 @ old.T, v1 @ old.T, body=body).moved(L, X)
 
 
-bezier, cubic, optimum = rb.closed_forms.bezier, rb.projected_cubic, rb.minimum_acceleration
+cubic = rb.projected_cubic
 DERIVED = {
-    "retimed": lambda start, goal: rb.geodesic(start, goal).retimed(2.5),
-    "retimed cubic": lambda A, B, v, w: cubic(A, B, v / 2, w / 2).retimed(0.5),
-    "moved": lambda *ends: moved(cubic, *ends),
-    "moved optimum": lambda *ends: moved(optimum, *ends),
+    "retimed": lambda A, B, v, w: cubic(A, B, v / 2, w / 2).retimed(0.5),
+    "moved": moved,
 }
 MAKERS = makers() | {
     f"{name}-{size}": Maker(function, size) for name, function in DERIVED.items() for size in (3, 4)
 }
-MAKERS["stationary-3"] = Maker(lambda *ends: rb.optimum.stationary(bezier(*ends)), 3)
+MAKERS["stationary-3"] = Maker(lambda *ends: rb.optimum.stationary(cubic(*ends)), 3)
 CORES = {3: [(3, 3), (3,), (3,), (3,)], 4: [(4, 4), (6,), (6,)]}  # each order has its core shape
 
 
@@ -436,100 +434,25 @@ def lasts_as_long_as_it_is_told(make):
             make(ends, duration=bad)
 
 
-def altered(name, change):
-    """Return a function that makes projected cubics with a method replaced by `change`."""
-
-    def make(*ends):
-        curve = copy(cubic(*ends))
-        right = getattr(curve.__class__, name)
-        changed = {name: lambda self, *given: change(right, self, *given)}
-        object.__setattr__(curve, "__class__", type("Altered", (curve.__class__,), changed))
-        curve.__dict__.update(given=ends, known={})
-        return curve
-
-    return make
-
-
-OTHER = rb.Body(np.diag([1.0, 2, 2.5]))
-
-
-def with_arrays_that_can_be_changed(curve):
-    object.__setattr__(curve, "ends", curve.ends.copy())
-    return curve
-
-
-def scaled(order, by):
-    return altered("__call__", lambda call, c, t, k=0: call(c, t, k) * (by if k == order else 1))
-
-
-# For each clause of the contract, these functions make deliberately faulty curves, which this
-# clause must detect.
-CONTRACT = {
-    meets_its_ends: {
-        "end": lambda A, B, v, w: bezier(A, B @ rb.exp_so3([0, 0, 1e-9]), v, w),
-        "end velocity": lambda A, B, v, w: bezier(A, B, v, 1.0000001 * w),
-        "velocities exchanged": lambda A, B, v, w: bezier(A, B, w, v),
-    },
-    has_the_derivatives_of_its_values: {
-        "velocity": scaled(1, 1.00001),
-        "acceleration lost": scaled(2, 0),
-        "jerk": scaled(3, 1.001),
-    },
-    is_the_stack_of_its_members: {
-        "wrong member": lambda A, B, v, w: bezier(A, np.flip(B, range(B.ndim - 2)), v, w),
-    },
-    has_values_at_times_of_any_shape: {
-        "wrong shape": altered("__call__", lambda call, c, t, k=0: call(c, np.ravel(t), k)),
-    },
-    takes_each_curve_at_its_own_times: {
-        "wrong member": altered("at_own_times", lambda at, c, *given: at(c[:, ::-1], *given)),
-    },
-    is_indexed_as_an_array_is: {
-        "wrong member": altered("__getitem__", lambda get, c, i: get(c, i if i != 0 else 1)),
-    },
-    is_the_same_at_one_time_and_in_one_pass: {
-        "state": altered("state", lambda state, c, t: state(c, t)._replace(velocity=c(t, 2))),
-        "single time": altered(
-            "_once", lambda once, c, *given: [1.00001 * x for x in once(c, *given)]
-        ),
-    },
-    keeps_and_changes_no_arguments: {
-        "argument changed": lambda A, B, v, w: bezier(A, B, np.add(v, 1e-9, out=v), w),
-        "argument kept": altered("__call__", lambda call, c, *given: cubic(*c.given)(*given)),
-        "result kept": altered(
-            "__call__", lambda call, c, t, k=0: c.known.setdefault(k, call(c, t, k))
-        ),
-    },
-    has_arrays_that_cannot_be_changed: {
-        "array": lambda A, B, v, w: with_arrays_that_can_be_changed(cubic(A, B, v, w)),
-    },
-    refuses_bad_arguments_by_name: {
-        "unchecked": lambda A, B, v, w: bezier(A, B, np.nan_to_num(v), w),
-    },
-    refuses_bad_times_and_orders: {
-        "unchecked": altered("__call__", lambda call, c, t, k=0: call(c, np.clip(t, 0, 1), k)),
-    },
-    is_the_same_after_pickling: {
-        "other curve": altered("__reduce__", lambda _, c: (cubic, (*c.given[:3], c.given[2]))),
-    },
-    moves_with_its_ends: {
-        "body's axes": lambda A, B, v, w: cubic(A, B, v, w * [1, 1, 1.0001]),
-        "room's axes": lambda A, B, v, w: cubic(A, B, v, w + 1e-6 * A[..., 0, :]),
-    },
-    is_reversed_with_its_ends: {
-        "one way": lambda *ends: rb.closed_forms.cayley_cubic(*ends),
-    },
-    costs_the_same_if_it_is_moved: {
-        "centre": altered("_moved", lambda move, c, L, X: replace(move(c, L, X), body=OTHER)),
-    },
-    knows_its_body: {
-        "body": lambda *ends: replace(cubic(*ends), body=OTHER),
-        "member's body": altered("retimed", lambda retime, c, T: replace(retime(c, T), body=OTHER)),
-    },
-    lasts_as_long_as_it_is_told: {
-        "unit of time": lambda A, B, v, w, *, duration=1.0: bezier(A, B, v, w).retimed(duration),
-    },
-}
+CONTRACT = [
+    meets_its_ends,
+    has_the_derivatives_of_its_values,
+    is_the_stack_of_its_members,
+    has_values_at_times_of_any_shape,
+    takes_each_curve_at_its_own_times,
+    is_indexed_as_an_array_is,
+    is_the_same_at_one_time_and_in_one_pass,
+    keeps_and_changes_no_arguments,
+    has_arrays_that_cannot_be_changed,
+    refuses_bad_arguments_by_name,
+    refuses_bad_times_and_orders,
+    is_the_same_after_pickling,
+    moves_with_its_ends,
+    is_reversed_with_its_ends,
+    costs_the_same_if_it_is_moved,
+    knows_its_body,
+    lasts_as_long_as_it_is_told,
+]
 
 
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
@@ -586,10 +509,3 @@ def test_errors_name_the_ends_that_do_not_fit_each_other(name):
             named = "start, goal" if "goal" in misfits else misfits[0]
             with pytest.raises(ValueError, match=f"^{named}: .* wanted"):
                 make(groups[0] | ends)
-
-
-@pytest.mark.parametrize("clause", CONTRACT)
-def test_each_fault_is_reported_under_the_clause_that_it_breaks(clause):
-    for fault in CONTRACT[clause].values():
-        with pytest.raises((AssertionError, ValueError, pytest.fail.Exception)):
-            clause(Maker(fault, 3))
