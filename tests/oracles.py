@@ -19,11 +19,6 @@ def exact_norm(w):
     return mp.sqrt(mp.fsum(mp.mpf(x) ** 2 for x in w))
 
 
-def exact_polynomial(coefficients, t):
-    """Return the sum of c_k t^k; the caller sets the precision."""
-    return mp.fsum(c * t**k for k, c in enumerate(coefficients))
-
-
 def polynomial_through(ends, t):
     """Return p(t) for the polynomial p with the given values and derivatives at 0 and 1."""
     count, ends = len(ends), np.asarray(ends, float)
@@ -230,87 +225,6 @@ def minimum_acceleration(turn, w0, w1, tol=1e-9):
     guess[:4] = quaternion(3 * t**2 - 2 * t**3)
     guess[4:7] = np.outer(w0, 1 - t) + np.outer(w1, t)
     return solve_bvp(rates, misses, t, guess, tol=tol, max_nodes=100_000)
-
-
-def free_body(moments, a, c, t):
-    """Return the velocity (a cn, b sn, c dn)(λ t) of Euler's free body, by Jacobi's functions.
-
-    It is (a, 0, c) at t = 0. The principal moments are J1 < J2 < J3, and a, c > 0 with a²J1 (J2 −
-    J1) < c²J3 (J3 − J2).
-    """
-    with mp.workdps(DIGITS):
-        J1, J2, J3, a, c, t = (mp.mpf(float(x)) for x in (*moments, a, c, t))
-        rate = c * mp.sqrt((J3 - J1) * (J3 - J2) / (J1 * J2))
-        b = (J3 - J1) * a * c / (rate * J2)
-        m = (J2 - J1) * a * b / (c * rate * J3)
-        assert m < 1
-        sn, cn, dn = (mp.ellipfun(name, rate * t, m=m) for name in ("sn", "cn", "dn"))
-        return np.array([float(a * cn), float(b * sn), float(c * dn)])
-
-
-def stationary(functional, ends, curve, tol=1e-9):
-    """Solve R p = c in quaternions by SciPy's `solve_bvp`, starting from a nearby curve.
-
-    `functional` is ("effort", G, M), for ∫ τᵀ M τ dt, or ("jerk",). `ends` are R0, R1, w0, w1, and
-    for the jerk a0, a1. Returns the solution, which has w in rows 4 – 6, and the cost ∫ ‖u‖² dt.
-    """
-    from scipy.integrate import solve_bvp
-    from scipy.spatial.transform import Rotation
-
-    def cross(x, y):
-        return np.cross(x, y, axis=0)
-
-    def in_body(q, c):
-        w, v = q[0], q[1:]
-        c = c[:, None] + 0 * v
-        # the vector c, turned by the conjugate of q / ‖q‖
-        turned = c + 2 * cross(v, cross(v, c) - w * c)
-        return turned + (1 / np.sum(q * q, axis=0) - 1) * (turned - c)
-
-    def spin(q, w):
-        return quaternion_product(q, np.concatenate([0 * w[:1], w])) / 2
-
-    mesh = np.linspace(0, 1, 40)
-    q = Rotation.from_matrix(curve(mesh)).as_quat(scalar_first=True)
-    for i in range(1, len(q)):
-        q[i] *= np.sign(q[i] @ q[i - 1])
-    w, a = curve(mesh, 1).T, curve(mesh, 2).T
-    if functional[0] == "effort":
-        G, M = functional[1:]
-        state, wanted = [M @ (G @ a + cross(w, G @ w))], []
-
-        def rates(_, y, c):
-            q, w, v = y[:4], y[4:7], y[7:10]
-            torque = np.linalg.solve(M, v)
-            w_rate = np.linalg.solve(G, torque - cross(w, G @ w))
-            v_rate = np.linalg.solve(G, in_body(q, c) + cross(G @ w, v)) - cross(w, v)
-            return np.concatenate([spin(q, w), w_rate, v_rate, np.sum(torque * v, axis=0)[None]])
-
-    else:
-        size = 1 + np.abs(curve(mesh, 3)).max()
-        j = curve(mesh, 3).T + cross(w, a) / 2
-        state, wanted = [a, j / size, 0 * j], [(7, ends[4:6])]
-
-        def rates(_, y, c):
-            q, w, a, j, g = y[:4], y[4:7], y[7:10], size * y[10:13], size * y[13:16]
-            g_rate = in_body(q, size * c) - cross(w, g) / 2 - cross(a, j)
-            square = np.sum(j * j, axis=0)[None] / size**2
-            return np.concatenate(
-                [spin(q, w), a, j - cross(w, a) / 2, g / size, g_rate / size, square]
-            )
-
-    wanted = [(4, ends[2:4]), *wanted]
-    y = np.concatenate([q.T, w, *state, np.zeros((1, len(mesh)))])
-
-    def misses(start, end, _):
-        goal = quaternion_product(q[-1] * [1, -1, -1, -1], end[:4])
-        pairs = ((row, x, v) for row, v in wanted for x, v in zip((start, end), v, strict=True))
-        rest = [x[row : row + 3] - v for row, x, v in pairs]
-        return np.concatenate([start[:4] - q[0], goal[1:], *rest, start[-1:]])
-
-    found = solve_bvp(rates, misses, mesh, y, p=np.zeros(3), tol=tol, max_nodes=200_000)
-    assert found.success, found.message
-    return found, float(found.y[-1, -1]) * (1 if functional[0] == "effort" else size**2)
 
 
 def least_directly(deviation, ends, curve, terms=16, nodes=80):

@@ -2,7 +2,6 @@ import re
 from types import SimpleNamespace
 
 import numpy as np
-import oracles
 import pytest
 import scipy.integrate
 
@@ -127,14 +126,6 @@ def test_energy_and_momentum_are_conserved(m):
     assert np.abs(slopes - v[:, 1]).max() < 1e-5
     assert np.abs(momentum(G, A, v) - momentum(G, A, v)[0, 0]).max() < 1e-10
     assert (rb.is_so if m == 3 else rb.is_se)(A, 1e-13).all()
-
-
-@pytest.mark.source("BK (8)", "BK 2.4")
-@pytest.mark.parametrize(("a", "c"), [(1, 1), (0.01, 2), (1.5, 1)])
-def test_a_free_body_follows_eulers_solution(a, c):
-    _, w = rb.connection.geodesic_flow(INERTIA, ONE, [a, 0, c], TIMES)
-    exact = [oracles.free_body([1, 2, 3], a, c, t) for t in TIMES]
-    assert np.abs(w - exact).max() < 1e-9
 
 
 @pytest.mark.source("BK (8)", "errata 13", "errata 26")

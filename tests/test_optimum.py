@@ -1,6 +1,5 @@
-"""Compare the optima with SciPy and direct minimisation, and test their equations."""
+"""Compare the optima with direct minimisation, and test their equations."""
 
-import re
 from functools import partial
 
 import numpy as np
@@ -28,14 +27,7 @@ from rbcourse.optimum._search import Search
 
 every_optimum = pytest.mark.parametrize("what", OPTIMA)
 TIMES = np.linspace(0, 1, 101)
-BODY = rb.Body(BOOK)
 FEW = random_problems(2, 5, 2.0, 4.0)
-
-
-def of_paper(case):
-    """Return a problem of the paper, for a ball and without accelerations at the ends."""
-    turn, w0, w1 = PAPER[case]
-    return I3, rb.exp_so3(turn), w0, w1, None, REST, REST
 
 
 @pytest.mark.source("BK (18)", "BK (19)", "BK (20)", "BK Prop. 7", "BK 6.2", "BK 6.3")
@@ -43,44 +35,17 @@ def of_paper(case):
 @pytest.mark.parametrize(
     ("what", "problem"),
     [
-        *(("ball", of_paper(case)) for case in PAPER),
+        ("ball", (I3, rb.exp_so3(PAPER["5"][0]), *PAPER["5"][1:], None, REST, REST)),
         *((what, some(FEW, i)) for what in ("acceleration", "torque", "jerk") for i in range(2)),
     ],
 )
-def test_solve_bvp_and_direct_minimisation_find_the_same_curve(what, problem):
+def test_direct_minimisation_finds_the_same_curve(what, problem):
     *ends, G, a0, a1 = problem
-    curve, tolerance = OPTIMA[what](*problem), 1e-8
+    curve = OPTIMA[what](*problem)
     ends += [a0, a1] * (what == "jerk")
-    if what == "ball":
-        theirs = oracles.minimum_acceleration(rb.log_so3(ends[1]), *ends[2:])
-        nodes, weights = np.polynomial.legendre.leggauss(200)
-        cost = weights @ np.sum(theirs.sol((nodes + 1) / 2)[7:10] ** 2, axis=0)
-        assert theirs.success
-        tolerance = 1e-9
-    else:
-        of = {"acceleration": ("effort", G, np.linalg.inv(G)), "torque": ("effort", G, I3)}
-        theirs, cost = oracles.stationary(of.get(what, ("jerk",)), ends, curve)
-        cost *= 2 if what == "jerk" else 1
-    y = theirs.sol(TIMES)
-    assert np.abs(curve(TIMES) - oracles.rotation_of_quaternions(y[:4])).max() < tolerance
-    assert np.abs(curve(TIMES, 1) - y[4:7].T).max() < tolerance
     w, least = oracles.least_directly(partial(deviation, what, G), ends, curve)
     assert np.abs(curve(TIMES, 1) - w(TIMES)).max() < 1e-6
-    assert [cost, least] == pytest.approx([curve.cost] * 2, rel=1e-9)
-
-
-@every_optimum
-def test_the_cost_is_the_integral_of_the_squared_deviation(what):
-    problems = random_problems(5, 33)
-    curves = OPTIMA[what](*problems)
-    x, weights = np.polynomial.legendre.leggauss(120)
-    rates = (np.moveaxis(curves((x + 1) / 2, k), 0, 1) for k in (1, 2, 3))
-    u = deviation(what, problems[4][:, None], *rates)
-    assert curves.cost == pytest.approx(np.sum(u**2, axis=-1) @ weights / 2, rel=1e-12)
-    slower = curves.retimed(3.0)
-    for some_of, i in ((curves, slice(None)), (curves[3], 3), (slower, slice(None))):
-        assert COSTS[what](some_of, problems[4][i]) == pytest.approx(some_of.cost, rel=1e-10)
-    assert times(slower(1.2), slower.costate(1.2)) == pytest.approx(slower.c, rel=1e-9)
+    assert least == pytest.approx(curve.cost, rel=1e-9)
 
 
 @pytest.mark.source("beyond BK 2", "BK (19)")
@@ -92,6 +57,8 @@ def test_the_costate_is_constant_in_the_fixed_frame_between_the_nodes(what):
     size = 1 + np.abs(p).max(axis=(0, 2))[:, None]
     assert np.all(np.abs(times(curves(t), p) - curves.c) < 1e-11 * size)
     assert np.abs(curves[3].costate(0.3) - curves.costate(0.3)[3]).max() < 1e-11 * size[3]
+    slower = curves.retimed(3.0)
+    assert times(slower(1.2), slower.costate(1.2)) == pytest.approx(slower.c, rel=1e-9)
     if what == "ball":
         w, a, b = (curves(t, order) for order in (1, 2, 3))
         number = np.vecdot(w, b) - np.vecdot(a, a) / 2
@@ -194,8 +161,7 @@ def test_single_problems_without_convergence_raise_an_error():
     R, w = rb.exp_so3([1, 2, 0]), 1e160 * I3[:2]
     with pytest.warns(RuntimeWarning, match=r"^2 of 2 problems .* \[0\]:"):
         curve = rb.minimum_acceleration(I3, R, w, w[::-1])
-    for values in (*(curve(TIMES, order) for order in range(3)), curve.c, curve.cost):
-        assert np.isnan(values).all()
+    assert np.isnan(curve(TIMES)).all()
     with pytest.raises(ValueError, match=r"^guess: a curve is NaN, since it did not converge"):
         rb.optimum.stationary(curve)
     for what, speed in (*((what, 1) for what in OPTIMA), ("ball", 1e-10), ("ball", 1e148)):
@@ -269,31 +235,3 @@ def test_the_solver_improves_a_guess():
     for guess in (I3, motion, rb.projected_spline([1, 2], [I3] * 2)):
         with pytest.raises(ValueError, match=r"^guess: a Curve on SO\(3\) that starts at t = 0"):
             rb.optimum.stationary(guess)
-
-
-@pytest.mark.parametrize(
-    ("G", "message"),
-    [
-        (np.diag([1.0, 2, 0]), "is not positive definite, to rounding: its eigenvalues are 0, "),
-        (np.diag([1.0, 2, -1]), "is not positive definite, to rounding: its eigenvalues are -1"),
-        (np.stack([I3, -I3]), "[1] is not positive definite"),
-        (I3 + 0.1 * I3[1], " is not symmetric"),
-        (5e307 * I3, ": eigenvalues from 1e-150 to 1e150 are wanted, got 5e+307"),
-        (1e-310 * BOOK, ": eigenvalues from 1e-150 to 1e150 are wanted"),
-    ],
-)
-def test_bad_inertias_are_refused(G, message):
-    with pytest.raises(ValueError, match=f"^inertia ?{re.escape(message)}"):
-        rb.Body(G)
-
-
-@pytest.mark.parametrize("make", [rb.minimum_acceleration, rb.minimum_torque])
-def test_an_inertia_is_no_body(make):
-    with pytest.raises(ValueError, match=r"^body: a Body is wanted, such as Body\(inertia\), got"):
-        make(I3, I3, body=BOOK)
-
-
-@pytest.mark.parametrize("make", [partial(rb.minimum_torque, body=BODY), rb.minimum_jerk])
-def test_an_optimum_of_rotations_alone_refuses_poses(make):
-    with pytest.raises(ValueError, match=r"^start, goal: minimum \w+ is .* got poses; take"):
-        make(np.eye(4), np.eye(4))

@@ -2,7 +2,6 @@
 
 import warnings
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import oracles
@@ -12,11 +11,7 @@ from quick import quick_for
 from scipy.spatial.transform import Rotation
 
 import rbcourse as rb
-from rbcourse._polynomials import grid, hermite
-from rbcourse.curves.ends import Ends
-from rbcourse.optimum._collocation import relax
-from rbcourse.optimum._guesses import Curves
-from rbcourse.optimum._search import LIMITS, Search, ball
+from rbcourse._polynomials import hermite
 
 MANY = random_problems(800, 50)
 # For these ends the short way costs 3504, and Bézier's curves cost 603 and 553.
@@ -47,8 +42,8 @@ KNOWN = {
     ".0926 -1.1733 13.5431  3.2645 -1.6836 -16.3042": "6350.394",
 }
 SELDOM_FOUND = {  # the least known costs of some fast problems in `best`
-    "acceleration": {60 + 9: 1251.1935149, 60 + 18: 842.5309036},
-    "torque": {60 + 16: 2919.2413078, 60 + 27: 2059.4960175},
+    "acceleration": {30 + 9: 1251.1935149, 30 + 18: 842.5309036},
+    "torque": {30 + 16: 2919.2413078, 30 + 27: 2059.4960175},
 }
 TIMES = np.linspace(0, 1, 101)
 OF_SLOW_ENDS = rb.closed_forms.bezier, rb.closed_forms.corrected_bezier  # defined for ‖w‖ < 3π
@@ -70,13 +65,16 @@ def random_ends(rng, angle, speed, count):
 @pytest.fixture(scope="module")
 def best():
     """Return many problems of each kind and their optima, in one stack."""
-    slow, fast = random_problems(60, 37), some(random_problems(40, 38, np.pi, 20.0), slice(28))
+    slow, fast = (
+        some(random_problems(60, 37), slice(30)),
+        some(random_problems(40, 38, np.pi, 20.0), slice(28)),
+    )
     of_bodies = [np.concatenate(pair) for pair in zip(slow, fast, strict=True)]
     # Newton's method does not converge from the projected cubics of these two problems.
     hard = vectors("-.1 2.5 -1.7  -7.1 7 4.1  -7.2 .4 8   .6 .4 -2.9  6 -2.5 8.6  -.2 7.1 -8.1")
-    many = random_ends(np.random.default_rng(12), np.pi, 12, 150)
+    many = random_ends(np.random.default_rng(12), np.pi, 12, 150)[:, :60]
     turn, *w = np.hstack([many, hard.reshape(2, 3, 3).swapaxes(0, 1)])
-    of_balls = [np.stack([I3] * 152), rb.exp_so3(turn), *w, None, REST, REST]
+    of_balls = [np.stack([I3] * 62), rb.exp_so3(turn), *w, None, REST, REST]
     problems = {"ball": of_balls, "acceleration": of_bodies, "torque": of_bodies, "jerk": slow}
     return {what: (some, OPTIMA[what](*some)) for what, some in problems.items()}
 
@@ -113,23 +111,6 @@ def test_no_closed_form_costs_less_than_the_optimum(best, what):
         u = deviation(what, None if G is None else G[those][:, None], *rates)
         # the trapezoidal rule is inaccurate
         assert np.all(np.trapezoid(np.sum(u**2, axis=-1), t) > curves.cost[those] * (1 - 1e-3))
-
-
-@pytest.mark.source("BK 6.2")
-def test_extra_turns_in_either_direction_do_not_cost_less(best):
-    """Newton's method starts from cumulative Bézier curves with four different numbers of turns."""
-    (R0, R1, w0, w1, *_), curves = best["ball"]
-    first, last = rb.exp_so3(-w0 / 3), rb.exp_so3(-w1 / 3)
-    middle = rb.log_so3(first @ R1 @ last)
-    axis = middle / np.linalg.norm(middle, axis=-1, keepdims=True)
-    t, equations = grid(17).t[:, None], ball(Ends(R0, R1, w0, w1)).equations
-    before, after = ((1 - (1 - t) ** 3) * w0[:, None] / 3, t**3 * w1[:, None] / 3)
-    for ways in (0, -1, 1, -2):
-        between = (3 * t**2 - 2 * t**3) * (middle + 2 * np.pi * ways * axis)[:, None]
-        with np.errstate(over="ignore", invalid="ignore"):
-            R = rb.exp_so3(before) @ rb.exp_so3(between) @ rb.exp_so3(after)
-            costs = 2 * np.array([one.cost for one in relax(equations, R)])
-        assert np.all(costs > curves.cost * (1 - 1e-9))
 
 
 def cost_about_an_axis(angle, k0, k1):
@@ -272,19 +253,6 @@ def test_the_best_quintic_has_the_least_jerk_about_one_axis():
     assert curves.cost[200:] == pytest.approx([3405.8885478242787, 13158.112233979306], rel=1e-10)
 
 
-@pytest.mark.parametrize("moments", [(1, 2.22, 3.18), (0.3, 1, 1.28)])
-def test_turns_about_the_largest_moment_may_leave_the_axis(moments):
-    """From rest to rest, a large turn about this axis is a saddle of the integral of squared
-    torque."""
-    exact, near, small = (
-        rb.minimum_torque(I3, rb.exp_so3(turn), body=rb.Body(np.diag(moments))).cost
-        for turn in ([0, 0, 3.1], [1e-4, 2e-4, 3.1], [0, 0, 1.0])
-    )
-    assert exact < 0.9 * 12 * (moments[2] * 3.1) ** 2
-    assert near == pytest.approx(exact, rel=1e-3)
-    assert small == pytest.approx(12 * moments[2] ** 2, rel=1e-10)
-
-
 def is_the_same_however_rounded(make, R1, rng, count):
     """Check that curves to goals near R1 have the same velocities; return these velocities."""
     t = np.linspace(0, 1, 5)
@@ -315,11 +283,3 @@ def test_rounding_does_not_choose_between_two_half_turns(what, axis):
     is_the_same_however_rounded(
         lambda R1: OPTIMA[what](I3, R1, REST, REST, 2 * I3, REST, REST), half, 180, 6
     )
-
-
-def test_the_cheapest_promising_curves_of_each_problem_are_kept(monkeypatch):
-    monkeypatch.setattr(LIMITS, "most", 2, raising=False)
-    R = rb.sample_rotation((6, 3), rng=5)
-    curves = Curves(np.array([0, 0, 0, 1, 0, 0]), R, np.array([4.0, 1, 3, 9, 2, 11]))
-    kept = Search.promising(SimpleNamespace(count=2), curves, 10)
-    assert kept.tolist() == [False, True, False, True, True, False]
