@@ -113,12 +113,3 @@ def test_the_last_angle_is_zero_within_16_eps_of_gimbal_lock():
         for sign in (1, -1):
             q = [0.5 + steps * 2.0**-53, -0.5 * sign, 0.5 * sign, 0.5]
             assert (zyx_from_quaternion(q)[2] == 0) is np.bool_(locked)
-
-
-def test_scipy_gives_half_turns_another_sign():
-    q, a = np.array([0, -0.6, 0.8, 0]), [0.3, -0.4, 0.5]
-    assert np.allclose(rb.quaternion_from_matrix(rb.matrix_from_quaternion(q)), q)
-    theirs = Rotation.from_quat(q, scalar_first=True).as_quat(scalar_first=True, canonical=True)
-    assert np.allclose(theirs, -q)
-    z, y, x = (Rotation.from_rotvec(k * e) for k, e in zip(a, np.eye(3)[::-1], strict=True))
-    assert np.allclose(Rotation.from_euler("zyx", a).as_matrix(), (x * y * z).as_matrix())

@@ -53,15 +53,3 @@ def test_the_jacobians_are_the_derivatives_of_their_functions(functional, what):
             lambda s, step=step: getattr(functional, what)(*(rates + s * step)), 0.0, 2.0**-7
         )
         assert np.abs(by[k][..., i] - slope).max() < 1e-11
-
-
-@pytest.mark.source("beyond BK 5")
-@pytest.mark.parametrize(("kappa", "same"), [(0, False), (0.5, True), (1, False)])
-def test_the_covariant_jerk_has_the_same_norm_for_the_inverse_motion(kappa, same):
-    """The inverse motion Rᵀ(t) has the body velocity −R w. Its jerk has the same norm only if κ =
-    ½."""
-    w, a, b = np.random.default_rng(4).normal(size=(3, 3))
-    here = b + kappa * np.cross(w, a)
-    # the derivatives of −R w, rotated back by R, are −w, −a and −(b + w × a)
-    there = -(b + np.cross(w, a)) + kappa * np.cross(-w, -a)
-    assert (abs(here @ here - there @ there) < 1e-12) == same

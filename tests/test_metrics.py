@@ -54,16 +54,6 @@ def test_the_metric_on_poses_is_a_product_without_a_parameter():
     assert np.abs(metrics.inner_left_invariant(coupled, A, X, Y)).min() > 1e-3
 
 
-@pytest.mark.source("BK (5)", "errata 35")
-def test_a_field_has_its_components_in_the_moved_basis():
-    """The printed basis L_i, without its bar, belongs to the identity."""
-    X = metrics.tangent_from_components(A, S)
-    moved = np.einsum("ni,nijk->njk", S, A[:, None] @ rb.connection.BASIS_SE3)
-    printed = np.einsum("ni,ijk->njk", S, rb.connection.BASIS_SE3)
-    assert np.abs(X - moved).max() < 40 * EPS
-    assert np.abs(X - printed).max(axis=(1, 2)).min() > 0.1
-
-
 @pytest.mark.source("BK (12)", "BK Remark 1", "BK Remark 2", "BK 3.1", "errata 1")
 @pytest.mark.source("BK (14)", "BK Remark 3", "BK Remark 4", "BK Remark 5", "BK 3.2")
 def test_induced_trace_metrics_are_twice_the_energy_of_a_ball():
@@ -98,12 +88,15 @@ def test_induced_trace_metrics_are_twice_the_energy_of_a_ball():
 
 
 @pytest.mark.source("BK (1)", "BK (4)", "BK (5)", "BK (6)", "BK (7)", "BK 2.2", "BK 2.3")
+@pytest.mark.source("errata 35")
 @pytest.mark.parametrize(("group", "left", "x", "y", "basis"), [ON_SO3, ON_SE3])
 def test_left_invariant_fields_agree_with_their_definition(group, left, x, y, basis):
-    """A field is the sum of its components times the moved basis vectors. A change of frame does
-    not change a metric."""
+    """A field is the sum of its components times the moved basis vectors; the printed basis L_i,
+    without its bar, belongs to the identity. A change of frame does not change a metric."""
     X, Y = metrics.tangent_from_components(group, x), metrics.tangent_from_components(group, y)
     assert_close(X, np.einsum("bi,bjk,ikl->bjl", x, group, basis))
+    printed = np.einsum("bi,ikl->bkl", x, basis)
+    assert np.abs(X - printed).max(axis=(1, 2)).min() > 0.1
     assert_close(metrics.components_from_tangent(group, X), x)
     assert_close(metrics.tangent_from_components(left @ group, x), left @ X)
     assert_close(metrics.components_from_tangent(left @ group, left @ X), x)
@@ -150,6 +143,7 @@ def test_the_weighted_trace_induces_the_inertia_of_a_body():
     p = sides[:, None] * (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) / np.sqrt(3)
     exact, box = metrics.inertia_from_weight(5 / 8 * p.mT @ p), rb.Body.box(sides, 5)
     assert_close(box.inertia, exact, 16 * exact.max())
+    assert box.mass == 5
     metrics.weight_from_inertia(box.inertia)  # the inertia of a body is accepted
     assert rb.Body.box([1e6, 1, 1], 12).inertia[0, 0] == 2  # no digits cancel
 
@@ -173,18 +167,16 @@ def test_a_weight_exists_if_the_moments_satisfy_triangle_inequalities():
 
 
 def test_arguments_that_do_not_fit_each_other_are_refused():
-    one, crooked, many = np.eye(3), np.eye(3, k=1), np.ones((4, 1, 1)) * np.eye(3)
-    inner, weight, unlike = "inner_left_invariant", "weight_from_inertia", "batch shapes do not"
+    one, crooked = np.eye(3), np.eye(3, k=1)
+    inner, weight = "inner_left_invariant", "weight_from_inertia"
     for name, arguments, message in (
         ("inner_gl", (np.eye(2), one), "X and Y: matrices of the same size are wanted"),
         ("inner_ga", ([[1]], [[1]]), "X: shape (..., n+1, n+1) is wanted"),
         ("tangent_from_components", (np.eye(2), [1]), "A: shape (..., 3, 3) or (..., 4, 4) is"),
         ("tangent_from_components", (one, np.ones(6)), "x: shape (..., 3)"),
-        ("tangent_from_components", (R[:2], w[:3]), f"{unlike} broadcast: A (2,), x (3,)"),
         ("components_from_tangent", (np.eye(4), one), "X: shape (..., 4, 4)"),
         (inner, (np.eye(6), *[one] * 3), "G: shape (..., 3, 3)"),
         (inner, (crooked, *[one] * 3), "G is not symmetric"),
-        (inner, (many, one, R[:2], R[:2]), f"{unlike} broadcast: G (4,), A (), X (2,), Y (2,)"),
         ("semi_riemannian_metric_se3", (0, 1), "alpha is 0.0, a number above 0 is wanted"),
         ("semi_riemannian_metric_se3", (1, [1]), "beta: shape () is wanted, got (1,)"),
         ("inertia_from_weight", (crooked,), "W is not symmetric"),

@@ -8,7 +8,6 @@ import pytest
 import rbcourse as rb
 from rbcourse import _foam, textbook
 from rbcourse._foam import nearest_rotations
-from rbcourse.projection import MANY
 
 EPS = np.finfo(float).eps
 DIMENSIONS = [1, 2, 3, 4, 7]
@@ -315,14 +314,6 @@ def test_foam_is_no_less_accurate_than_the_svd(kind):
     bound = 2 * EPS * (1 + condition(M, want)[:, None, None])
     assert np.all((np.abs(R - want) <= bound)[right])
     assert_members(R[right])
-
-
-def test_foam_projects_every_matrix_of_a_stack():
-    for count in (0, 1, MANY - 1, MANY, BLOCK - 1, BLOCK, BLOCK + 1, 2 * BLOCK + 1):
-        M = members(3, np.random.default_rng(count), count)
-        R, right = by_foam(3 * M)
-        assert np.array_equal(right, np.ones(count, bool))
-        assert np.abs(R - M).max(initial=0) <= 8 * EPS
 
 
 @pytest.mark.source("BK Prop. 2")
