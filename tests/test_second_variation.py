@@ -45,7 +45,7 @@ def upright(what, angle):
     return stationary(what, R, (I3, rb.exp_so3(angle * axis), REST, REST))
 
 
-def hessian(curve, count=16, nodes=41, h=2e-2):
+def hessian(curve, count=10, nodes=41, h=2e-2):
     """Return eigenvalues of the second variation relative to ∫ ‖η⁽ᵏ⁾‖², where η turns the nodes.
 
     The second differences use only values of R exp(η̂) at the nodes.
@@ -73,12 +73,6 @@ def hessian(curve, count=16, nodes=41, h=2e-2):
     H = np.zeros((m, m))
     H[tuple(pairs.T)] = H[tuple(pairs.T[::-1])] = sums / (8 * h * h)
     return np.linalg.eigvalsh(H)
-
-
-def test_the_second_differences_are_right_for_a_curve_at_rest():
-    """At rest, the cost of R exp(η̂) is ∫ ‖η''‖² to second order, so the matrix is the identity."""
-    rest = rb.minimum_acceleration(I3, I3, REST, REST)
-    assert hessian(rest) == pytest.approx(1, abs=1e-5)
 
 
 def test_the_constants_of_the_lemma_are_right():
