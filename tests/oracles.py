@@ -91,30 +91,24 @@ def right_jacobian_so3(w):
     return np.einsum("n,nij->ij", weights / 2, turns)
 
 
-def theta(t, angle, order=0):
-    """Return θ of BK (16) for f(t) = t, or its derivative by differences."""
+def _derivative(formula, t, angle, order):
     with mp.workdps(DIGITS):
         w = mp.mpf(float(angle))
-        return float(
-            mp.diff(
-                lambda u: mp.atan2(u * mp.sin(w), 1 - u + u * mp.cos(w)) / w,
-                mp.mpf(float(t)),
-                order,
-            )
-        )
+        return float(mp.diff(lambda u: formula(u, w), mp.mpf(float(t)), order))
+
+
+def theta(t, angle, order=0):
+    """Return θ of BK (16) for f(t) = t, or its derivative by differences."""
+    return _derivative(
+        lambda u, w: mp.atan2(u * mp.sin(w), 1 - u + u * mp.cos(w)) / w, t, angle, order
+    )
 
 
 def f(t, angle, order=0):
     """Return f of BK Corollary 2, or its derivative by differences."""
-    with mp.workdps(DIGITS):
-        w = mp.mpf(float(angle))
-        return float(
-            mp.diff(
-                lambda u: mp.sin(w * u) / (mp.sin(w * (1 - u)) + mp.sin(w * u)),
-                mp.mpf(float(t)),
-                order,
-            )
-        )
+    return _derivative(
+        lambda u, w: mp.sin(w * u) / (mp.sin(w * (1 - u)) + mp.sin(w * u)), t, angle, order
+    )
 
 
 def line_singular_value(t, angle):

@@ -7,11 +7,10 @@ import pytest
 
 import rbcourse as rb
 from rbcourse import _foam, textbook
-from rbcourse._foam import nearest_rotations
+from rbcourse._foam import TOGETHER, nearest_rotations
 
 EPS = np.finfo(float).eps
 DIMENSIONS = [1, 2, 3, 4, 7]
-BLOCK = 5000
 
 
 def members(n, rng, count=40):
@@ -318,11 +317,11 @@ def test_foam_is_no_less_accurate_than_the_svd(kind):
 
 @pytest.mark.source("BK Prop. 2")
 def test_stacking_matrices_does_not_change_their_projections():
-    """Some matrices are near the singular set. Some are extreme, or have rank 1 or 0."""
+    """They fill more than one block. Some are near the singular set, extreme, or of rank 1 or 0."""
     rng = np.random.default_rng(10)
     kinds = [*KINDS.values(), np.ones((1, 3, 3)), 1e200 * np.ones((1, 3, 3))]
     kinds += [factor * KINDS["noisy"] for factor in (-1, 2.0**900, 2.0**-900, 1e150, 1e-150)]
-    M = np.concatenate([*kinds, rng.normal(size=(2 * BLOCK, 3, 3))])
+    M = np.concatenate([*kinds, rng.normal(size=(TOGETHER, 3, 3))])
     M[:3, 1, 2], M[3] = (0, 1e200, 1e-200), 5e-324
     order = rng.permutation(len(M))
     R = rb.project_so(M[order])[np.argsort(order)]
@@ -346,7 +345,7 @@ def test_scaling_by_powers_of_two_does_not_change_any_bit(power):
 
 
 def test_threads_do_not_disturb_each_other():
-    stacks = np.random.default_rng(2).normal(size=(2, 3 * BLOCK, 3, 3))
+    stacks = np.random.default_rng(2).normal(size=(2, 15_000, 3, 3))
     wants = [rb.project_so(M) for M in stacks]
     assert not np.shares_memory(*wants)
     with ThreadPoolExecutor(2) as pool:

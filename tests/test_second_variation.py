@@ -45,12 +45,13 @@ def upright(what, angle):
     return stationary(what, R, (I3, rb.exp_so3(angle * axis), REST, REST))
 
 
-def hessian(curve, count=10, nodes=41, h=2e-2):
+def hessian(curve, nodes=41, h=2e-2):
     """Return eigenvalues of the second variation relative to ∫ ‖η⁽ᵏ⁾‖², where η turns the nodes.
 
     The second differences use only values of R exp(η̂) at the nodes.
     """
     functional, k = curve.functional, curve.functional.ends // 2
+    count = 10 if k == 1 else 16  # polynomials that find the saddles, of the jerk from 14 on
     points, weights = grid(nodes), grid(nodes).integral[-1]
     R = curve(points.t)
     D = points.derivative
