@@ -44,7 +44,7 @@ def profiles(curve: Curve, *, body: Body | None = None, **limits: Unpack[Limits]
     --------
     >>> from rbcourse import fastest, geodesic, pose_from_coordinates
     >>> path = geodesic(np.eye(4), pose_from_coordinates([0, 0, 1, 2, 0, 0]))
-    >>> fig = profiles(fastest(path, acceleration=3, speed=1), acceleration=3, speed=1)
+    >>> fig = profiles(fastest(path, acceleration=3, speed=1), acceleration=3, speed=np.ones(3))
     >>> len(fig.axes)
     4
     """
@@ -54,7 +54,8 @@ def profiles(curve: Curve, *, body: Body | None = None, **limits: Unpack[Limits]
         limits_used(curve, body=body, **limits)  # checks the arguments
     t = np.linspace(*curve.domain, _TIMES)
     drawn = _vectors(curve, t, body or curve.body, np.asarray(limits.pop("gravity", np.zeros(3))))
-    shown = [name for name in drawn if name not in ("torque", "force") or limits.get(name)]
+    given = {name: limit for name, limit in limits.items() if limit is not None}
+    shown = [name for name in drawn if name not in ("torque", "force") or name in given]
     columns = 2 if curve.size == 4 else 1
     rows = -(-len(shown) // columns)
     fig, axes = plt.subplots(
@@ -66,9 +67,9 @@ def profiles(curve: Curve, *, body: Body | None = None, **limits: Unpack[Limits]
         figsize=(4.2 * columns, 1.9 * rows + 0.4),
     )
     for ax, name in zip(axes.flat, shown, strict=False):
-        _draw(ax, t, drawn[name], limits.get(name))
+        _draw(ax, t, drawn[name], given.get(name))
         ax.set(ylabel="{}\n({})".format(*_NAMES[name]), xlim=(t[0], t[-1]))
-        ax.set_ylim(0, ax.get_ylim()[1] * (1.12 if limits.get(name) else 1))  # room for "limit"
+        ax.set_ylim(0, ax.get_ylim()[1] * (1.12 if name in given else 1))  # room for "limit"
     for ax in axes.flat[len(shown) :]:
         ax.remove()
     for ax in axes.flat[len(shown) - columns : len(shown)]:  # the last one of each column
@@ -99,7 +100,7 @@ def _vectors(curve: Curve, t: Array, body: Body, gravity: Array) -> dict[str, Ar
 
 def _draw(ax: Any, t: Array, vectors: Array, limit: Any) -> None:
     """Draw the norm, or the components if there is a limit for each of them."""
-    most = np.atleast_1d([]) if limit is None else np.atleast_1d(limit)
+    most = np.atleast_1d([] if limit is None else limit)
     if len(most) == 3:
         for axis, x, highest in zip("xyz", np.abs(vectors).T, most, strict=True):
             ax.plot(t, x, color=COLOURS[axis], label=axis)
