@@ -23,18 +23,10 @@ Update = Callable[[int], Sequence[Any]]
 
 @dataclass(frozen=True, repr=False)
 class Animation(Player):
-    """A player of a moving figure; it also stores the frames as pictures.
+    """A player of a moving figure; it also stores the frames as pictures."""
 
-    Parameters
-    ----------
-    pictures : tuple of Image
-        The frames, for a GIF.
-    seconds : float
-        The duration of the animation.
-    """
-
-    pictures: tuple[Image.Image, ...] = ()
-    seconds: float = 4.0
+    pictures: tuple[Image.Image, ...] = ()  # the frames, for a GIF
+    seconds: float = 4.0  # the duration
 
     def save(self, path: str | Path) -> None:
         """Write the animation to a file as a GIF that repeats forever."""

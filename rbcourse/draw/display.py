@@ -41,26 +41,18 @@ for (const image of document.querySelectorAll("#$name")) rbcourseDisplay.revive(
 
 
 class Display(RendererBase):
-    """A Matplotlib renderer that returns drawings as numbers.
+    """A Matplotlib renderer that returns drawings of a figure as numbers.
 
-    Parameters
-    ----------
-    fig : Figure
-        The figure, of at most 1500 pixels in each direction. The canvas has the same size.
+    Its `size`, width and height in pixels, is that of the figure and at most 1500.
 
-    Attributes
-    ----------
-    size : tuple of int
-        Width and height in pixels.
-    styles : dict of tuple to int
-        The number of each style. A style has the fill colour, the line (its colour, width, dashes,
-        ends and corners), the clip rectangle, and the marker, whose polygons are written as in
-        `record`. Missing parts are None or empty. Lengths are in pixels, except for markers. For a
-        piece in space, the style also has the number of the `Space`, and the kind and zorder of the
-        piece.
-    rooms : list of dict
-        For each `Space` of the figure: ``origin`` (where its centre appears, in pixels from the
-        upper left corner) and ``view`` (azimuth and elevation, in degrees).
+    The dict `styles` has the number of each style. A style has the fill colour, the line (its
+    colour, width, dashes, ends and corners), the clip rectangle, and the marker, whose polygons are
+    written as in `record`. Missing parts are None or empty. Lengths are in pixels, except for
+    markers. For a piece in space, the style also has the number of the `Space`, and the kind and
+    zorder of the piece.
+
+    The list `rooms` has, for each `Space` of the figure, the ``origin`` (where its centre appears,
+    in pixels from the upper left corner) and the ``view`` (azimuth and elevation, in degrees).
     """
 
     def __init__(self, fig: Figure) -> None:
@@ -189,45 +181,25 @@ def joined(states: Sequence[NDArray[np.int16]]) -> bytes:
 class Player:
     """A figure that readers can move without Python. Without scripts, it is a still picture.
 
-    Parameters
-    ----------
-    name, alt, caption : str
-        The name of the figure, its description, and its caption as HTML.
-    shown, background : bytes
-        PNGs with twice the displayed resolution: the still picture, and the fixed background.
-    display : Display
-        The display that has recorded the states.
-    states : sequence of ndarray
-        One state for each combination of the controls. The last control changes fastest.
-    controls : sequence of dict
-        For each control, its ``label``, its ``values`` as texts, and the index of its ``first``
-        value. The play button moves the last control. Without controls, there is one state, whose
-        view can be turned.
-    milliseconds : int, optional
-        The time from one state to the next while the figure plays.
-    texts : sequence, optional
-        For each state, the texts to be shown: pairs of a name and a text, a notice, and all texts
-        as one line.
-    computed, script : str, optional
-        The name of an explorer in JavaScript that computes the states, and the script that adds it
-        to ``rbcourseDisplay.explorers``. Then `states` has one state for each artist.
-    parts : sequence of dict, optional
-        For each artist of such an explorer: its ``name``, the map ``axes`` from its coordinates to
-        pixels, and, if it is a text, the ``anchor`` of the recorded state, in pixels.
+    There is a state for each combination of the controls. The last control changes fastest, and the
+    play button moves it. Without controls, there is one state, whose view can be turned. If an
+    explorer in JavaScript computes the states, there is one for each artist. The `parts` then have,
+    for each artist, its ``name``, the map ``axes`` from its coordinates to pixels, and, if it is a
+    text, the ``anchor`` of the recorded state, in pixels.
     """
 
     name: str
-    alt: str
-    caption: str
-    shown: bytes
-    background: bytes
-    display: Display
+    alt: str  # the description
+    caption: str  # as HTML
+    shown: bytes  # the still picture, a PNG with twice the displayed resolution
+    background: bytes  # the same of the fixed background
+    display: Display  # it has recorded the states
     states: Sequence[NDArray[np.int16]]
-    controls: Sequence[dict[str, Any]]
-    milliseconds: int = 0
-    texts: Sequence[Any] = ()
-    computed: str = ""
-    script: str = ""
+    controls: Sequence[dict[str, Any]]  # ``label``, ``values`` as texts, index of the ``first``
+    milliseconds: int = 0  # from one state to the next while the figure plays
+    texts: Sequence[Any] = ()  # of each state: pairs of name and text, a notice, all as one line
+    computed: str = ""  # the name of an explorer
+    script: str = ""  # adds it to ``rbcourseDisplay.explorers``
     parts: Sequence[dict[str, Any]] = ()
 
     def __repr__(self) -> str:

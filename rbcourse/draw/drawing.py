@@ -43,25 +43,15 @@ OPTIONS: Mapping[str, tuple[tuple[int, ...], str]] = {
 class Drawing:
     """A figure of a text, with the numbers that it shows.
 
-    Parameters
-    ----------
-    figure : matplotlib Figure
-        The figure; of an animation, its last frame.
-    name : str
-        The name of its files without the extension.
-    data : dict of ndarray, all of one shape
-        The plotted numbers by the names of their columns, which end with a unit.
-    alt : str
-        A description, for readers who do not see the figure.
-    moving : tuple of (update, int, float), optional
-        ``update(i)``, which moves the artists to frame i; the number of frames, and their duration
-        in s.
+    The `data` are the plotted numbers by the names of their columns, which end with a unit. For an
+    animation, `moving` has ``update(i)``, which moves the artists to frame i, the number of frames,
+    and their duration in s.
     """
 
-    figure: Figure
-    name: str
+    figure: Figure  # of an animation, its last frame
+    name: str  # of its files, without the extension
     data: Table
-    alt: str
+    alt: str  # a description, for readers who do not see the figure
     moving: tuple[Update, int, float] | None = None
 
     def __repr__(self) -> str:
@@ -107,16 +97,10 @@ def style() -> AbstractContextManager[None]:
 def run(
     module: str, figures: Mapping[str, Callable[..., Drawing]], words: Sequence[str] | None = None
 ) -> None:
-    """Draw the figures that a command line names into files.
+    """Draw the figures that a command line names into files; `module` is for the help.
 
-    Parameters
-    ----------
-    module : str
-        The module, for the help.
-    figures : dict of callable
-        The functions of the figures by their names. Their keyword-only parameters are options.
-    words : list of str, optional
-        The command line, by default that of the program.
+    Keyword-only parameters of the functions are options. By default, the command line is that of
+    the program.
     """
     options = {name: _options(draw) for name, draw in figures.items()}
     parser = argparse.ArgumentParser(

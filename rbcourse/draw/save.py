@@ -53,28 +53,13 @@ PALE = "#8F8F8F"
 
 @dataclass(frozen=True)
 class Picture:
-    """A saved figure as shown in a notebook: the picture with its description.
+    """A saved figure as shown in a notebook: the picture with its description."""
 
-    Parameters
-    ----------
-    name : str
-        The name of the figure's files without the extension.
-    alt : str
-        The alternative text, which describes the figure.
-    caption : str
-        The first sentence of the description, and the names of the files, as HTML.
-    png : bytes
-        The picture. Its resolution is higher than displayed, so that it is sharp on fine and large
-        screens.
-    width : int
-        The displayed width in pixels.
-    """
-
-    name: str
-    alt: str
-    caption: str
-    png: bytes
-    width: int
+    name: str  # of the files, without the extension
+    alt: str  # the description
+    caption: str  # its first sentence, and the names of the files, as HTML
+    png: bytes  # with a resolution for fine and large screens
+    width: int  # displayed, in pixels
 
     def __repr__(self) -> str:
         return f"{self.name}: {self.alt}"

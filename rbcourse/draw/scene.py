@@ -25,36 +25,20 @@ OVERLAP = 0.55
 class Piece:
     """A piece of a scene that is drawn in one step.
 
-    Parameters
-    ----------
-    kind : str
-        A filled "face"; a "line"; a "mark", such as a letter, which always faces the viewer; or a
-        "ball", a mark whose plane separates pieces behind it from pieces in front.
-    places : ndarray, shape (n, 3) or (n, 4)
-        The positions relative to the middle of the axes, in pixels. For lines, the fourth number is
-        the visible length from the start, which places the dashes.
-    gc : GraphicsContextBase
-        The look of the piece.
-    fill : tuple of float, optional
-        The fill colour.
-    marker : tuple of Path
-        The outlines that are drawn at each position, in pixels, with y upwards.
-    zorder : float
-        The order of pieces that no face separates; the lowest zorder is drawn first.
-    normal : ndarray, shape (3,), optional
-        For a face, the normal of the whole face, of which the piece may be a part.
-    text : artist, optional
-        For letters, the artist that draws them in print, with its font.
+    It is a filled "face"; a "line"; a "mark", such as a letter, which always faces the viewer; or a
+    "ball", a mark whose plane separates pieces behind it from pieces in front. Its `places`, shape
+    (n, 3) or (n, 4), are relative to the middle of the axes, in pixels. For lines, the fourth
+    number is the visible length from the start, which places the dashes.
     """
 
     kind: Literal["face", "line", "mark", "ball"]
     places: Array
-    gc: GraphicsContextBase
-    fill: Any = None
-    marker: tuple[Path, ...] = ()
-    zorder: float = 0.0
-    normal: Array | None = None
-    text: Any = None
+    gc: GraphicsContextBase  # the look
+    fill: Any = None  # a colour
+    marker: tuple[Path, ...] = ()  # outlines at each position, in pixels, with y upwards
+    zorder: float = 0.0  # of pieces that no face separates, the lowest zorder is drawn first
+    normal: Array | None = None  # of the whole face, of which the piece may be a part
+    text: Any = None  # for letters, the artist that draws them in print, with its font
 
     @property
     def edge(self) -> "Piece":

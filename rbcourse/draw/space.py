@@ -43,14 +43,9 @@ LIGHT = np.array([0.48, -0.36, 0.8])
 
 
 class Faces(Artist):
-    """The faces of a convex body; faces that are turned to the light are lighter.
+    """The faces of a convex body, with a colour for each; those turned to the light are lighter.
 
-    Parameters
-    ----------
-    corners : ndarray, shape (n, k, 3)
-        The corners of each face, in order around it.
-    colours : sequence of colours
-        The colour of each face.
+    The array `corners`, shape (n, k, 3), has the corners of each face, in order around it.
     """
 
     def __init__(self, corners: Array, colours: Any) -> None:
@@ -218,23 +213,11 @@ class Looks(RendererBase):
 
 @dataclass(frozen=True)
 class Sight:
-    """The view of a `Space`.
+    """The view of a `Space`; `right`, `up` and `eye` are unit vectors, the last one to the eye."""
 
-    Parameters
-    ----------
-    scale : float
-        The number of pixels per unit of length.
-    middle : ndarray, shape (3,)
-        The middle of the limits, which does not move when the view turns.
-    origin : ndarray, shape (2,)
-        The image of the middle, in pixels.
-    right, up, eye : ndarray, shape (3,)
-        Unit vectors to the right, upwards and to the eye.
-    """
-
-    scale: float
-    middle: Array
-    origin: Array
+    scale: float  # pixels per unit of length
+    middle: Array  # of the limits; it does not move when the view turns
+    origin: Array  # the image of the middle, in pixels
     right: Array
     up: Array
     eye: Array
@@ -255,12 +238,7 @@ class Space(Axes3D):  # type: ignore[misc]
 
     The axes are the Matplotlib projection "space": ``plt.subplots(subplot_kw={"projection":
     "space"})``. Artists are added by ``plot`` and ``text``, and by ``add_artist`` with `Faces` or a
-    `Ball`. Elevations are from -90° to 90°, and the roll is 0.
-
-    Attributes
-    ----------
-    scene : Scene
-        The artist that draws all contents.
+    `Ball`. Elevations are from -90° to 90°, and the roll is 0. The `scene` draws all contents.
     """
 
     name = "space"
@@ -347,7 +325,10 @@ def _strokes(artist: Line3D, looks: Looks, sight: Sight) -> Iterable[Piece]:
         else:
             for start, stop in contiguous_regions(np.isfinite(places).all(axis=1)):
                 if stop - start > 1:
-                    run = _along(places[start:stop], sight)
+                    run = places[start:stop]
+                    steps = np.linalg.norm(np.diff(sight.flat(run), axis=0), axis=1)
+                    along = np.cumsum([0.0, *steps])  # the visible distance along the line
+                    run = np.column_stack([run, along])
                     yield Piece("line", run, gc, zorder=artist.get_zorder())
 
 
@@ -358,9 +339,3 @@ def _marked(every: Any) -> Any:
     if isinstance(every, list | slice):
         return every
     raise ValueError(f"markevery: None, an integer, a list or a slice is wanted, got {every!r}")
-
-
-def _along(places: Array, sight: Sight) -> Array:
-    """Return points with a fourth column: their visible distance along the line."""
-    steps = np.linalg.norm(np.diff(sight.flat(places), axis=0), axis=1)
-    return np.column_stack([places, np.concatenate([[0.0], np.cumsum(steps)])])
