@@ -34,8 +34,15 @@ def canonical(q: Array) -> Array:
 
 
 def quaternion_of(R: Array) -> Array:
-    """Compute `quaternion_from_matrix` without checks."""
-    four_qq = _four_outer(R)
+    """Compute `quaternion_from_matrix` without checks: normalise the largest row of 4 q qᵀ."""
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(R, (-2, -1), (0, 1))
+    rows = [
+        [1 + a + e + i, h - f, c - g, d - b],
+        [h - f, 1 + a - e - i, b + d, c + g],
+        [c - g, b + d, 1 - a + e - i, f + h],
+        [d - b, c + g, f + h, 1 - a - e + i],
+    ]
+    four_qq = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
     largest = np.argmax(np.diagonal(four_qq, axis1=-2, axis2=-1), axis=-1)
     row = np.take_along_axis(four_qq, largest[..., None, None], axis=-2)[..., 0, :]
     return canonical(row / np.linalg.norm(row, axis=-1, keepdims=True))
@@ -62,18 +69,6 @@ def axis_and_angle(w: Array) -> tuple[Array, Array]:
             angle[extreme] = np.hypot.reduce(w[extreme], axis=-1, keepdims=True)
             as_finite("norm of w", angle[..., 0])
     return w / np.where(angle == 0, 1.0, angle), angle
-
-
-def _four_outer(R: Array) -> Array:
-    """Return 4 q qᵀ, shape (..., 4, 4), for the quaternion q of R."""
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(R, (-2, -1), (0, 1))
-    rows = [
-        [1 + a + e + i, h - f, c - g, d - b],
-        [h - f, 1 + a - e - i, b + d, c + g],
-        [c - g, b + d, 1 - a + e - i, f + h],
-        [d - b, c + g, f + h, 1 - a - e + i],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def product(p: Jet, q: Jet) -> Jet:

@@ -30,14 +30,8 @@ FORMATS = {
     "kitti": ["r11", "r12", "r13", "x", "r21", "r22", "r23", "y", "r31", "r32", "r33", "z"],
 }
 """The meanings of the columns in files without names of columns."""
-VELOCITIES = {
-    "wx body [rad/s]": "wx",
-    "wy body [rad/s]": "wy",
-    "wz body [rad/s]": "wz",
-    "vx body [m/s]": "vx",
-    "vy body [m/s]": "vy",
-    "vz body [m/s]": "vz",
-}
+VELOCITIES = {f"w{axis} body [rad/s]": f"w{axis}" for axis in "xyz"}
+VELOCITIES |= {f"v{axis} body [m/s]": f"v{axis}" for axis in "xyz"}
 """The meanings of the columns of velocities, which have exactly these names."""
 EXACT = Context(prec=60)
 DIGITS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
@@ -101,24 +95,12 @@ _LOG = logging.getLogger("rbcourse.files")
 
 
 class Recording(NamedTuple):
-    """The rows of a file that are kept.
-
-    Parameters
-    ----------
-    file : str or Path
-        The file.
-    lines : list of int
-        The number of the line of each row.
-    stamps : list of Decimal
-        The exact times in s, which increase.
-    columns : dict of ndarray
-        The columns by their meanings, as in `FORMATS` and `VELOCITIES`; positions are in m.
-    """
+    """The rows of a file that are kept."""
 
     file: File
-    lines: list[int]
-    stamps: list[Decimal]
-    columns: dict[str, Array]
+    lines: list[int]  # the number of the line of each row
+    stamps: list[Decimal]  # the exact times in s, which increase
+    columns: dict[str, Array]  # by their meanings, as in `FORMATS`, `VELOCITIES`; positions in m
 
     def place(self, i: int | np.intp) -> str:
         """Return the place of a row, for messages."""
@@ -157,7 +139,10 @@ def read_recording(
     """Read the rows of a file with poses; the arguments are those of `read_path`."""
     rows = _read_rows(file)
     timed = times is not None or rate is not None
-    columns, stated, length = _named(rows, form) if rows.names else _unnamed(rows, form, timed)
+    if rows.names:
+        columns, stated, length = _named(rows, form)
+    else:
+        columns, stated, length = _unnamed(rows, form, timed), None, 1.0
     _check_times(rows, columns, timed)
     _check_one_body(rows)
     if rate is not None and unit is not None:
@@ -461,8 +446,8 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     return columns, time, LENGTHS[lengths.pop()]
 
 
-def _unnamed(rows: _Rows, form: str | None, timed: bool) -> tuple[Columns, str | None, float]:
-    """Return the columns of a format, as `_named` does."""
+def _unnamed(rows: _Rows, form: str | None, timed: bool) -> Columns:
+    """Return the columns of a format."""
     cells, place = rows.cells(0), rows.place(0)
     width = len(cells) - (not cells[-1])  # a separator may be at the end of each line
     if form is None and rows.comment:
@@ -501,7 +486,7 @@ def _unnamed(rows: _Rows, form: str | None, timed: bool) -> tuple[Columns, str |
         raise ValueError(
             f"{place}: {len(meanings)} columns are wanted for format={form!r}, got {width}"
         )
-    return {meaning: i for i, meaning in enumerate(meanings)}, None, 1.0
+    return {meaning: i for i, meaning in enumerate(meanings)}
 
 
 def _check_times(rows: _Rows, columns: Columns, timed: bool) -> None:
@@ -539,9 +524,8 @@ def _numbers(rows: _Rows, chosen: Sequence[int]) -> Array:
         if sorted(chosen) == [*range(width)]:
             every: Array = np.loadtxt(rows.texts, **options)
             return every[:, chosen]
-        if all(text.count(rows.separator or " ") >= width - 1 for text in rows.texts):
-            _check_widths(rows, width)
-            return np.loadtxt(rows.texts, usecols=chosen, **options)
+        _check_widths(rows, width)
+        return np.loadtxt(rows.texts, usecols=chosen, **options)
     _check_widths(rows, width)
     names = rows.names or [f"column {i + 1}" for i in range(width)]
     table = np.full((len(rows.texts), len(chosen)), np.nan)

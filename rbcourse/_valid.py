@@ -78,16 +78,14 @@ def _wrong_shape(name: str, shape: tuple[int, ...], wanted: str) -> ValueError:
     makers = {
         (3, 3): "pose_from_components makes poses of rotations and positions",
         (3, 4): "a pose also has the row [0, 0, 0, 1]",
-        3: "exp_so3 makes rotations of rotation vectors",
-        4: "matrix_from_quaternion makes rotations of quaternions (w, x, y, z)",
-        6: "pose_from_coordinates makes poses of rotation vectors and positions",
-        7: "pose_from_components makes poses of positions and of the rotations that "
+        (4, 4): "",
+        (3,): "exp_so3 makes rotations of rotation vectors",
+        (4,): "matrix_from_quaternion makes rotations of quaternions (w, x, y, z)",
+        (6,): "pose_from_coordinates makes poses of rotation vectors and positions",
+        (7,): "pose_from_components makes poses of positions and of the rotations that "
         "matrix_from_quaternion makes of quaternions (w, x, y, z)",
     }
-    if shape[-2:] == (4, 4):
-        hint = None
-    else:
-        hint = makers.get(shape[-2:]) or makers.get(shape[-1] if shape else 0)
+    hint = makers.get(shape[-2:], makers.get(shape[-1:]))
     cure = f"; {hint}" if hint else ""
     return ValueError(f"{name}: shape {wanted} is wanted, got {shape}{cure}")
 

@@ -161,12 +161,10 @@ def geodesic_flow(G: ArrayLike, A0: ArrayLike, v0: ArrayLike, t: ArrayLike) -> t
     -----
     Singular set: none. For an indefinite metric on SE(3), the velocity may grow exponentially,
     beyond the range of the floating-point numbers. If the integration fails, FloatingPointError is
-    raised.
-    An eighth-order Runge–Kutta method with a relative tolerance of 3e-14 solves A' = A hat(v), v'_i
-    = −Γ_ijk v_j v_k. On SO(3), these are Euler's equations. The N members of a batch share the
-    tolerance, so the error of a single member may be up to √N times larger. `screw` gives
-    geodesics of the metric (10) in closed form. `geodesic` gives geodesics of
-    (12) and (14) in closed form.
+    raised. An eighth-order Runge–Kutta method with a relative tolerance of 3e-14 solves A' = A
+    hat(v), v'_i = −Γ_ijk v_j v_k. On SO(3), these are Euler's equations. The N members of a batch
+    share the tolerance, so the error of a single member may be up to √N times larger. In closed
+    form, `screw` gives geodesics of the metric (10), and `geodesic` those of (12) and (14).
 
     Examples
     --------

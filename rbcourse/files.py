@@ -289,7 +289,7 @@ def load_plan(file: File, kind: str) -> Commands:
     names = [*_velocities(kind, max(0, len(header) - 1)), DURATION]
     if header != names:
         raise ValueError(f"{place}: {', '.join(names)} are wanted, got {', '.join(header)[:200]!r}")
-    return [_command(place, _row(place, names, cells)) for place, cells in rows]
+    return [_command(place, names, cells) for place, cells in rows]
 
 
 def replace_file(file: File, content: bytes) -> None:
@@ -403,14 +403,10 @@ def _velocities(kind: str, joints: int) -> list[str]:
     raise ValueError(f"kind: one of {wanted} is wanted, got {kind!r}")
 
 
-def _command(place: str, row: list[float]) -> tuple[Array, float]:
+def _command(place: str, names: list[str], cells: list[str]) -> tuple[Array, float]:
+    if len(cells) != len(names):
+        raise ValueError(f"{place}: {len(names)} numbers are wanted, got {len(cells)}")
+    row = [to_number(f"{place}, {name}", x) for name, x in zip(names, cells, strict=True)]
     if len(row) == 1:
         raise ValueError(f"{place}: a velocity is wanted, but there is no column for it")
     return as_command(f"{place}:", (row[:-1], row[-1]), "n")
-
-
-def _row(place: str, names: list[str], cells: list[str]) -> list[float]:
-    if len(cells) != len(names):
-        raise ValueError(f"{place}: {len(names)} numbers are wanted, got {len(cells)}")
-    numbers = zip(names, cells, strict=True)
-    return [to_number(f"{place}, {name}", cell) for name, cell in numbers]

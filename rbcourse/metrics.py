@@ -292,6 +292,7 @@ def _trace(X: ArrayLike, Y: ArrayLike, size: int | str) -> Array:
     return product
 
 
+@described_by(returns="ndarray, shape (..., 3, 3) or (..., 4, 4)")
 def mean_rotation(rotations: ArrayLike, weights: ArrayLike | None = None) -> Array:
     """Return the rotation R with the least Σ wᵢ ‖R − Rᵢ‖², or the pose: the mean, projected.
 
@@ -303,10 +304,6 @@ def mean_rotation(rotations: ArrayLike, weights: ArrayLike | None = None) -> Arr
         N rotation matrices or poses.
     weights : array_like, shape (..., N), optional
         Positive weights, such as 1/σᵢ² for a noise of σᵢ rad.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3) or (..., 4, 4)
 
     Raises
     ------

@@ -132,9 +132,8 @@ def exp_planar(S: ArrayLike) -> Array:
     """Return the pose to which the constant body twist S leads from (0, 0, 0) in unit time.
 
     The matrix of this pose is the exponential of [[0, −omega, vx], [omega, 0, vy], [0, 0, 0]].
-    There is no singular set; omega = 0 gives the translation exactly. In the pose (x, y, omega),
-    the point (x, y) is the end of an arc through the angle omega. The vector (x, y) is (vx, vy),
-    turned by omega/2 and multiplied by sin(omega/2) / (omega/2).
+    There is no singular set; omega = 0 gives the translation exactly. The vector (x, y) of the pose
+    is (vx, vy), turned by omega/2 and multiplied by sin(omega/2) / (omega/2).
     Source: RR 3.2.
 
     Examples
@@ -153,8 +152,7 @@ def log_planar(pose: ArrayLike) -> Array:
     """Return the body twist with −π ≤ omega ≤ π that leads from (0, 0, 0) to a pose in unit time.
 
     Singular set: half-turns, to which two twists lead. theta = π gives omega = π, and −π gives −π.
-    If full turns are added to these angles, rounding decides the sign. `exp_planar` maps the twists
-    (vx, vy, omega) to the poses, up to full turns.
+    If full turns are added to these angles, rounding decides the sign.
     Source: RR 3.1.
 
     Examples
@@ -206,7 +204,7 @@ def interpolate_planar(
 def propagate_planar(start: ArrayLike, plan: Plan, *, frame: str = "world") -> Array:
     """Return the poses, with full turns, at the start and after each command of a plan.
 
-    The path has a pose only at the end of each command. To see poses in between, divide a command.
+    To see poses in between, divide a command.
     Source: RR 3.2, RR (17), RR (18), RR (19).
 
     Parameters

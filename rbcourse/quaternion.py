@@ -87,9 +87,8 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
 def quaternion_from_matrix(R: ArrayLike) -> Array:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix, with w ≥ 0.
 
-    The matrix 4 q qᵀ is linear in R. The row that contains the largest diagonal entry is
-    normalised. The result is accurate to a few eps. Singular set: half-turns, where
-    `canonical_quaternion` chooses between q and −q.
+    The result is accurate to a few eps. Singular set: half-turns, where `canonical_quaternion`
+    chooses between q and −q.
     Source: BK Remark 7.
 
     Examples
