@@ -17,7 +17,8 @@ __all__ = ["Body"]
 class Body:
     """A rigid body, which determines the cost of a motion.
 
-    A body is immutable. Curves keep their body as the attribute ``body``.
+    A body is immutable; its parameters are also its attributes. Curves keep their body as the
+    attribute ``body``.
     Source: BK (12), BK (14); for other bodies, beyond BK 1.
 
     Parameters
@@ -30,12 +31,6 @@ class Body:
         The mass in kg, above 0.
     centre : array_like, shape (3,), optional
         The centre of mass in the body frame, in m.
-
-    Attributes
-    ----------
-    inertia : ndarray, shape (..., 3, 3)
-    mass : float
-    centre : ndarray, shape (3,)
 
     Examples
     --------
@@ -115,16 +110,8 @@ class Body:
         """The shape of a stack of bodies; ``()`` for one body."""
         return self.inertia.shape[:-2]
 
-    def take(self, index: Any, batch: tuple[int, ...]) -> Body:
-        """Return the bodies of some curves of a stack.
-
-        Parameters
-        ----------
-        index : int, slice or array of int
-            A NumPy index into the flattened stack.
-        batch : tuple of int
-            The shape of the stack of curves.
-        """
+    def _take(self, index: Any, batch: tuple[int, ...]) -> Body:
+        """Return the bodies of some curves of a stack, whose shape is `batch`."""
         if not self.batch_shape:
             return self
         flat = np.broadcast_to(self.inertia, (*batch, 3, 3)).reshape(-1, 3, 3)

@@ -241,12 +241,14 @@ def _surveyed(curve: Curve, ends: Array) -> Path:
     slow = np.all(rests & level, axis=-1)
     resting = np.all(rests, axis=-1)
     stops = _stops(V, resting, moves)
+    size = np.abs(V).max(axis=(0, 3))
+    change = np.abs(V - V[2]).max(axis=(0, 3)) / np.maximum(size, 1e-300)
     return Path(
         legs=legs,
         knots=knots - knots[0],
         moves=moves,
         rests=rests,
-        change=_change(V),
+        change=np.max(change, axis=-1),
         x=_x_at_stops(stops, resting, slow, ends),
         fine=_fine_ends(stops, moves, slow),
     )
@@ -260,9 +262,9 @@ def _sampled(legs: Curve) -> Triple:
     """
     t = np.linspace(0, 1, 5)[:, None] * legs.duration
     shape = 5, legs.count, -1, 3
-    V = legs.evaluate(t, 1).reshape(shape)
-    A = legs.evaluate(t, 2).reshape(shape)
-    coordinates = legs.evaluate(t[::4], 0)[..., :3, 3:]
+    V = legs._evaluate(t, 1).reshape(shape)
+    A = legs._evaluate(t, 2).reshape(shape)
+    coordinates = legs._evaluate(t[::4], 0)[..., :3, 3:]
     largest = np.abs(coordinates).max(initial=0)
     unit = np.array([1.0, largest])
     return V, A, unit[: V.shape[2]]
@@ -282,12 +284,6 @@ def _stops(V: Array, resting: Flags, moves: Flags) -> Flags:
     rest = resting[1, :-1] & resting[0, 1:]
     pause = ~moves[1:] | ~moves[:-1]
     return corner | rest | pause
-
-
-def _change(V: Array) -> Array:
-    size = np.abs(V).max(axis=(0, 3))
-    change = np.abs(V - V[2]).max(axis=(0, 3))
-    return np.max(change / np.maximum(size, 1e-300), axis=-1)
 
 
 def _x_at_stops(stops: Flags, resting: Flags, slow: Flags, ends: Array) -> Array:

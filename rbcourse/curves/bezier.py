@@ -130,11 +130,6 @@ def corrected_bezier(
     array([0., 1., 0.])
     """
     given = between(start, goal, v0, v1, duration=duration)
-    return moving(given, corrected(given))
-
-
-def corrected(given: Given) -> CorrectedBezier:
-    """Return the rotation of `corrected_bezier` for checked boundary conditions."""
     ends, legs = given.ends, _slow_legs(given.ends)
     curve = _bezier(given, legs)
     sigma = nearest_turn(log(ends.turn), legs[0] + legs[1] + legs[2])
@@ -142,11 +137,12 @@ def corrected(given: Given) -> CorrectedBezier:
     middle = quaternion_from_rotation_vector(sigma / 2)
     points = quaternion_multiply(quaternion_conjugate(middle)[..., None, :], curve.controls)
     pure = [np.concatenate([np.zeros_like(c[..., :1]), c], axis=-1) for c in deviation]
-    return CorrectedBezier(
+    rotation = CorrectedBezier(
         duration=given.duration,
         start=quaternion_multiply(curve.start, middle),
         controls=np.concatenate([points, np.stack(pure, axis=-2)], axis=-2),
     )
+    return moving(given, rotation)
 
 
 def bezier_legs(ends: Ends) -> Legs:

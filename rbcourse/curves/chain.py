@@ -37,6 +37,7 @@ _ARRIVED = 1e-6
 _SMOOTH = 1e-9  # a velocity jumps if it changes at a knot by more than this share of the largest
 
 
+@described_by(spline_velocities)
 def chain(
     times: ArrayLike,
     poses: ArrayLike,
@@ -52,10 +53,6 @@ def chain(
 
     Parameters
     ----------
-    times : array_like, shape (N,)
-        Two or more increasing times.
-    poses : array_like, shape (N, 3, 3) or (N, 4, 4)
-        A rotation matrix or a pose for each of the times.
     velocities : array_like, shape (N, 3) or (N, 6), optional
         Angular velocities or twists (ω, v) at the poses, in the body frame; required without `leg`.
     accelerations : array_like, shape (N, 3) or (N, 6), optional
@@ -323,8 +320,7 @@ class Chain(Curve):
     def _what(self) -> str:
         return f"Chain of {self.legs.count} legs, {self.legs._what()},"
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration; the first time is kept."""
+    def _lasting(self, duration: Array) -> Self:
         start, end = self.domain
         share = float(duration) / (end - start)
         if start + float(duration) == start:
@@ -337,7 +333,7 @@ class Chain(Curve):
             self,
             duration=duration,
             times=times,
-            legs=self.legs.lasting(share * self.legs.duration),
+            legs=self.legs._lasting(share * self.legs.duration),
             velocities=None if self.velocities is None else self.velocities / share,
         )
 
@@ -356,13 +352,13 @@ class Chain(Curve):
         starts, ends = _at_ends(self.legs, order)
         return starts[1:] - ends[:-1]
 
-    def evaluate(self, t: Array, order: int) -> Array:
+    def _evaluate(self, t: Array, order: int) -> Array:
         """Return the values at the times t, shape (T, 1), each from the leg at that time."""
         times = t[:, 0]
         if np.any(times[1:] < times[:-1]):
             values = np.empty((len(t), 1, *self._core(order)))
             in_order = np.argsort(times)
-            values[in_order] = self.evaluate(t[in_order], order)
+            values[in_order] = self._evaluate(t[in_order], order)
             return values
         own = np.searchsorted(self.times[1:-1], times, side="right")
         shares = np.minimum((times - self.times[own]) / np.diff(self.times)[own], 1)
@@ -376,7 +372,7 @@ class Chain(Curve):
         i = bisect_right(times, t, 1, len(times) - 1) - 1
         h = times[i + 1] - times[i]
         try:
-            values = self.legs.single(i, min((t - times[i]) / h, 1.0), orders)
+            values = self.legs._single(i, min((t - times[i]) / h, 1.0), orders)
         except SingularTime as error:
             raise self._lost(error) from error
         return [x / h**k if k else x for x, k in zip(values, orders, strict=True)]
@@ -419,7 +415,7 @@ def evaluate_legs(legs: Curve, own: NDArray[np.intp], shares: Array, order: int)
     for part in blocks(len(leg), max(1, BLOCK // index.shape[1])):
         rows = index[part]
         try:
-            some = legs.take(first + leg[part]).values(shares[rows].T, order)
+            some = legs._take(first + leg[part]).values(shares[rows].T, order)
         except SingularTime as error:
             raise SingularTime(
                 error.time, int(first + leg[part][error.curve]), error.reason

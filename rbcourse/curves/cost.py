@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -108,8 +107,14 @@ def acceleration_cost_parts(
         functional = Effort(_inertias(curve, legs, body), of_torque=False)
     rotation = _rotation_cost(name, curve, legs, functional, rtol)
     translation: Array = np.zeros(legs.count)
+    r = body.centre
     if legs.size == 4:
-        squared = partial(_squared_acceleration, body.centre)
+
+        def squared(some: Curve, t: Array, index: Index) -> Array:
+            A = some.values(t, 2)
+            V = some.values(t, 1) if r.any() else A  # the velocity does not matter at the origin
+            return np.sum(of_point(r, V, A) ** 2, axis=-1)
+
         translation = body.mass * integral(name, legs, squared, rtol)
     return rotation, summed(curve, translation, legs, 3)
 
@@ -138,7 +143,7 @@ def torque_cost(curve: Curve, *, body: Body | None = None, rtol: float = 1e-10) 
     return _rotation_cost("torque cost", curve, legs, Effort(inertias, of_torque=True), rtol)
 
 
-@described_by(acceleration_cost)
+@described_by(acceleration_cost, returns="ndarray, shape curve.batch_shape")
 def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     """Return ∫ 2 ‖w'' + ½ w × w'‖² dt, the integral of the squared covariant jerk in metric (12).
 
@@ -146,10 +151,6 @@ def jerk_cost(curve: Curve, *, rtol: float = 1e-10) -> Array:
     SO(3). The errors and the accuracy are those of `acceleration_cost`; an error is also raised if
     the acceleration of a `chain` jumps.
     Source: beyond BK 5; M. Žefran, V. Kumar and C. Croke 1998.
-
-    Returns
-    -------
-    ndarray, shape curve.batch_shape
 
     Examples
     --------
@@ -207,13 +208,6 @@ def _rotation_cost(
     return summed(curve, costs, legs, functional.ends + 1)
 
 
-def _squared_acceleration(r: Array, curve: Curve, t: Array, index: Index) -> Array:
-    """Return ‖d_c''‖² for the point r of the body."""
-    A = curve.values(t, 2)
-    V = curve.values(t, 1) if r.any() else A  # the velocity does not matter at the origin
-    return np.sum(of_point(r, V, A) ** 2, axis=-1)
-
-
 def integral(name: str, curve: Curve, density: Density, rtol: float) -> Array:
     """Integrate `density` over unit time for each curve of a stack, by adaptive quadrature.
 
@@ -239,7 +233,7 @@ def integral(name: str, curve: Curve, density: Density, rtol: float) -> Array:
         for part in blocks(len(index), _TOGETHER):
             t = start[part] + fine.t[:, None] * width[part]
             try:
-                squares = density(flat.take(index[part]), t, index[part])
+                squares = density(flat._take(index[part]), t, index[part])
             except SingularTime as found:
                 i = int(index[part][found.curve])
                 raise SingularTime(found.time, i, found.reason, curve.batch_shape) from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from html import escape
@@ -157,7 +158,7 @@ class Curve:
         times = as_time(t, 0, self.domain)
         if times.ndim == 0 and not self.batch_shape:
             return self._once(float(times), (order,))[0]
-        values = self.evaluate(times.reshape(-1, 1), order)
+        values = self._evaluate(times.reshape(-1, 1), order)
         return values.reshape(times.shape + self.batch_shape + self._core(order))
 
     @described_by(__call__, returns="State")
@@ -183,26 +184,17 @@ class Curve:
         """Return derivatives of a single curve at one time."""
         T = float(self.duration)
         try:
-            values = self.single(0, t / T, orders)
+            values = self._single(0, t / T, orders)
         except SingularTime as error:
             raise SingularTime(error.time * T, 0, error.reason) from None
         return [x / T**k if k else x for x, k in zip(values, orders, strict=True)]
 
-    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+    def _single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
         """Return derivatives of curve number i of the flat stack at one time from 0 to 1.
 
         Subclasses replace this by a method without the overhead of stacks.
-
-        Parameters
-        ----------
-        i : int
-            The index of the curve in the flattened stack.
-        t : float
-            The time, as a fraction of the duration.
-        orders : tuple of int
-            The orders of the derivatives with respect to this time.
         """
-        flat, time = self.flat if self.count == 1 else self.flat.take([i]), np.array([[t]])
+        flat, time = self.flat if self.count == 1 else self.flat._take([i]), np.array([[t]])
         try:
             return [flat.values(time, k)[0, 0] for k in orders]
         except SingularTime as error:
@@ -227,6 +219,7 @@ class Curve:
             rate[..., 3:] -= cross(twist[..., :3], twist[..., 3:])
         return rate
 
+    @described_by(__call__)
     def at_own_times(self, t: ArrayLike, order: Order = 0) -> Array:
         """Evaluate each curve of the stack, or a derivative, at its own times.
 
@@ -237,8 +230,6 @@ class Curve:
         ----------
         t : array_like, shape (...) + batch_shape
             Times in the domains of the curves.
-        order : {0, 1, 2, 3}, optional
-            The order of the derivative; on SE(3), at most 2.
         """
         times, stacked = as_array("t", t), len(self.batch_shape)
         if times.shape[max(0, times.ndim - stacked) :] != self.batch_shape:
@@ -248,14 +239,14 @@ class Curve:
         times = as_time(times, 0, (start, start + self.duration))
         rows = math.prod(times.shape[: times.ndim - stacked])
         self._check_order(order)
-        values = self.evaluate(times.reshape(rows, self.count), order)
+        values = self._evaluate(times.reshape(rows, self.count), order)
         return values.reshape(times.shape + self._core(order))
 
     def __getitem__(self, index: Any) -> Self:
         """Return one curve or a smaller stack, by NumPy's rules of indexing."""
         if not self.batch_shape:
             raise TypeError("a single curve is not a stack and has no index")
-        return self.take(np.arange(self.count).reshape(self.batch_shape)[index])
+        return self._take(np.arange(self.count).reshape(self.batch_shape)[index])
 
     def __len__(self) -> int:
         """Return the length of the first axis of a stack."""
@@ -294,7 +285,7 @@ class Curve:
         if check_broadcast(curve=(self.duration, 0), duration=(T, 0)) != self.batch_shape:
             wanted = f"a single number or shape {self.batch_shape} is wanted"
             raise ValueError(f"duration: {wanted}, got shape {T.shape}")
-        return self.lasting(np.broadcast_to(T, self.batch_shape))
+        return self._lasting(np.broadcast_to(T, self.batch_shape))
 
     def moved(self, left: ArrayLike | None = None, right: ArrayLike | None = None) -> Curve:
         """Return the curve L c(t) X: the same motion in another fixed frame or body frame.
@@ -354,8 +345,15 @@ class Curve:
         return f"<{what}{self._result()}>"
 
     def _repr_html_(self) -> str:
-        """Return the description, and a picture of the speeds, for notebooks."""
-        return _html(self)
+        """Return the description and, for a single curve, a picture of its speeds."""
+        words, drawn = escape(repr(self)[1:-1]), ""
+        if not self.batch_shape:
+            with suppress(RuntimeError, ValueError):  # the curve jumps
+                rates = self(np.linspace(*self.domain, 121), 1)
+                drawn = "<br>" + _graph(rates[:, :3], "#0072b2", "‖ω‖", "rad")
+                if self.size == 4:
+                    drawn += _graph(rates[:, 3:], "#d55e00", "‖v‖", "m")
+        return f"<div>{words}{drawn}</div>"
 
     def _what(self) -> str:
         return type(self).__name__
@@ -364,35 +362,22 @@ class Curve:
         """Return words about the cost of an optimum; "" for other curves."""
         return ""
 
-    def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these indices in the flattened stack.
-
-        Parameters
-        ----------
-        index : int, slice or array of int
-            A NumPy index into an axis with all curves. An array of indices, of any shape, gives a
-            stack of this shape.
-        """
+    def _take(self, index: Any) -> Self:
+        """Return the curves with these indices in the flattened stack, in the shape of `index`."""
         parts = {field.name: getattr(self, field.name) for field in fields(self)}
         stacked = len(self.batch_shape)
         for name, value in parts.items():
             if isinstance(value, Curve):
-                parts[name] = value.take(index)
+                parts[name] = value._take(index)
             elif isinstance(value, Body):
-                parts[name] = value.take(index, self.batch_shape)
+                parts[name] = value._take(index, self.batch_shape)
             elif isinstance(value, np.ndarray):
                 flat = value.reshape(self.count, *value.shape[stacked:])
                 parts[name] = np.asarray(flat[index])
         return type(self)(**parts)
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the same curves with other durations, without the checks of `retimed`.
-
-        Parameters
-        ----------
-        duration : ndarray, shape batch_shape
-            The new durations.
-        """
+    def _lasting(self, duration: Array) -> Self:
+        """Return the same curves with other durations, without the checks of `retimed`."""
         return replace(self, duration=duration)
 
     def values(self, t: Array, order: int) -> Array:
@@ -411,16 +396,8 @@ class Curve:
         """
         raise NotImplementedError
 
-    def evaluate(self, t: Array, order: int) -> Array:
-        """Return all curves of the flattened stack, or a derivative, without checks.
-
-        Parameters
-        ----------
-        t : ndarray, shape (T, count) or (T, 1)
-            Times in the domains of the curves.
-        order : int
-            The order of the derivative.
-        """
+    def _evaluate(self, t: Array, order: int) -> Array:
+        """Return `values` at times in the domains of the curves, without checks."""
         T, core = self.flat.duration, self._core(order)
         shares = t / (T[:1] if np.all(T[:1] == T) else T)
         values = np.empty((len(t), self.count, *core))
@@ -438,7 +415,7 @@ class Curve:
     @cached_property
     def flat(self) -> Self:
         """The same curves as a stack with one axis."""
-        return self if len(self.batch_shape) == 1 else self.take(np.arange(self.count))
+        return self if len(self.batch_shape) == 1 else self._take(np.arange(self.count))
 
     def _check_order(self, order: int) -> None:
         check_order(order, 3 if self.size == 3 else 2)
@@ -469,8 +446,7 @@ class QuaternionCurve(Curve):
             return np.moveaxis(angular_velocity(Q), 0, -1)
         return rotation(multiply(self.start.T[:, None], Q[0]))
 
-    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
-        """Return derivatives of one curve at one time, from one jet."""
+    def _single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
         flat, time = self.flat, np.array([[t]])
         Q = flat.quaternion(flat._first[:, :, None, i : i + 1], time, max(orders))
         try:
@@ -516,18 +492,15 @@ class Moved(Curve):
         """The `Curve.breakpoints` of the curve that is moved."""
         return self.curve.breakpoints
 
-    def take(self, index: Any) -> Self:
-        """Return the stack of the curves with these indices in the flattened stack."""
-        some, body = self.curve.take(index), self.body.take(index, self.batch_shape)
+    def _take(self, index: Any) -> Self:
+        some, body = self.curve._take(index), self.body._take(index, self.batch_shape)
         return replace(self, duration=some.duration, body=body, curve=some)
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the same curves with other durations."""
-        return replace(self, duration=duration, curve=self.curve.lasting(duration))
+    def _lasting(self, duration: Array) -> Self:
+        return replace(self, duration=duration, curve=self.curve._lasting(duration))
 
-    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
-        """Return derivatives of one curve at one time."""
-        pose, *rates = self.curve.single(i, t, tuple(range(max(orders) + 1)))
+    def _single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+        pose, *rates = self.curve._single(i, t, tuple(range(max(orders) + 1)))
         found = [self.left @ pose @ self.right, *moved_rates(self.right, *rates)]
         return [found[k] for k in orders]
 
@@ -631,21 +604,6 @@ def least_over_time(
         centre = np.take_along_axis(times, least, axis=0)[0]
         reach, count = 2 * reach / (count - 1), 17
     return centre, np.take_along_axis(values, least, axis=0)[0]
-
-
-def _html(curve: Curve) -> str:
-    """Return the description of a curve and, for a single curve, a picture of its speeds."""
-    words = escape(repr(curve)[1:-1])
-    if curve.batch_shape:
-        return f"<div>{words}</div>"
-    try:
-        rates = curve(np.linspace(*curve.domain, 121), 1)
-    except (RuntimeError, ValueError):  # the curve jumps
-        return f"<div>{words}</div>"
-    drawn = _graph(rates[:, :3], "#0072b2", "‖ω‖", "rad")
-    if curve.size == 4:
-        drawn += _graph(rates[:, 3:], "#d55e00", "‖v‖", "m")
-    return f"<div>{words}<br>{drawn}</div>"
 
 
 def _graph(rates: Array, colour: str, name: str, unit: str) -> str:

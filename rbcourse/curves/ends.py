@@ -66,7 +66,18 @@ def between(
     body: Body | None = None,
     duration: ArrayLike = 1.0,
 ) -> Given:
-    """Check boundary conditions; velocities and accelerations that are None are 0."""
+    """Check boundary conditions; velocities and accelerations that are None are 0.
+
+    Parameters
+    ----------
+    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
+        Rotation matrices, or poses.
+    v0, v1 : array_like, shape (..., 3) or (..., 6), optional
+        The velocities at both ends in the body frame: angular velocities w for rotations, twists
+        (ω, v) for poses. The default is rest. `twist_from_rates` makes twists of ω and ḋ.
+    duration : array_like, shape (...), optional
+        The duration of the motion; velocities are per unit of this time.
+    """
     start, size = as_rotations_or_poses("start", start)
     goal, size_of_goal = as_rotations_or_poses("goal", goal)
     if size != size_of_goal:

@@ -33,7 +33,7 @@ from rbcourse.straight_line import singular_value, theta_at, theta_bend, theta_r
 Progress = Callable[[Array, int], ArrayLike]
 
 
-@described_by(returns="Curve")
+@described_by(between, returns="Curve")
 def geodesic(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) -> Curve:
     """Return the shortest curve between two rotations (metric (12)) or two poses (metric (14)).
 
@@ -45,13 +45,6 @@ def geodesic(start: ArrayLike, goal: ArrayLike, *, duration: ArrayLike = 1.0) ->
     of largest magnitude (the first, if several are equal) is positive. For poses, `screw` is a
     geodesic of another metric.
     Source: BK 6.1; for poses, BK 2.6, BK (14).
-
-    Parameters
-    ----------
-    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotation matrices, or poses.
-    duration : array_like, shape (...), optional
-        The duration of the motion.
 
     Examples
     --------
@@ -115,19 +108,14 @@ class AlongGeodesic(Curve):
     """The `Curve` R0 exp(σ̂ p(t)) on the geodesic from R0 to R0 exp(σ̂); by default, p(t) = t.
 
     Source: BK 6.1.
-
-    Attributes
-    ----------
-    R0, rotation_vector : ndarray, shapes (..., 3, 3) and (..., 3)
-        The start, and the rotation vector σ from the start to the goal, in the body frame.
     """
 
-    rotation_vector: Array
+    rotation_vector: Array  # σ, from the start to the goal, in the body frame, shape (..., 3)
     terms: Array  # R0, R0 K and R0 K², for Rodrigues' formula R0 (I + sin a K + (1 − cos a) K²)
 
     @property
     def R0(self) -> Array:
-        """The start."""
+        """The start, shape (..., 3, 3)."""
         return self.terms[..., 0, :, :]
 
     def _progress(self, t: Array, order: int) -> Array:
@@ -143,8 +131,14 @@ class AlongGeodesic(Curve):
                 np.multiply(progress, self.rotation_vector[:, i], out=values[..., i])
             return values
         weights = np.empty((3, count, len(t)))
-        weights[0] = 1
-        _write_sine_and_versine(progress.T, self._half_angle, *weights[1:])
+        one, sine, versine = weights  # 1, sin a and 1 − cos a, by tan(a/2)
+        one[:] = 1
+        tangent = np.tan(np.multiply(progress.T, self._half_angle, out=versine), out=versine)
+        np.multiply(tangent, tangent, out=sine)
+        sine += 1
+        np.divide(tangent, sine, out=sine)
+        sine *= 2
+        versine *= sine
         return weighted_sums(weights.T, self.terms.reshape(count, 3, 9), 3, 3)
 
     @cached_property
@@ -152,28 +146,11 @@ class AlongGeodesic(Curve):
         return np.linalg.norm(self.rotation_vector, axis=-1, keepdims=True) / 2
 
 
-def _write_sine_and_versine(progress: Array, half: Array, sine: Array, versine: Array) -> None:
-    """Write sin a and 1 − cos a, computed from tan(a/2), where a is 2 · `half` · `progress`."""
-    tangent = np.tan(np.multiply(progress, half, out=versine), out=versine)
-    np.multiply(tangent, tangent, out=sine)
-    sine += 1
-    np.divide(tangent, sine, out=sine)
-    sine *= 2
-    versine *= sine
-
-
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ProjectedLine(AlongGeodesic):
     """The projection of a straight line between two rotations; here p(t) = θ(f(t)).
 
     Source: BK Prop. 6, BK (15), BK (17).
-
-    Attributes
-    ----------
-    margin : ndarray, shape (...)
-        2 cos(‖σ‖/2). This is the minimum, over all M on the line, of the sum of the two smallest
-        eigenvalues of RᵀM, where R is the projection of M. If the margin is 0, the middle of the
-        line has no unique projection.
     """
 
     timing: Progress
@@ -182,7 +159,10 @@ class ProjectedLine(AlongGeodesic):
 
     @property
     def margin(self) -> Array:
-        """The minimum over time of the sum of the two smallest eigenvalues of RᵀM."""
+        """The minimum, over all M on the line, of the sum of the two smallest eigenvalues of RᵀM.
+
+        If it is 0, the middle of the line has no unique projection.
+        """
         return 2 * np.cos(self._angle / 2)
 
     @property
@@ -293,7 +273,7 @@ def _checked_line(given: Given, timing: Progress) -> ProjectedLine:
         timed=shape,
     )
     warn_if_nearly_singular(curve.margin, 0.5, "t" if timing is identity else "f(t)")
-    start, end = curve.take(number.ravel()).on_line(np.array([[0.0], [1.0]]), 0)
+    start, end = curve._take(number.ravel()).on_line(np.array([[0.0], [1.0]]), 0)
     for i in np.flatnonzero((np.abs(start) > 1e-12) | (np.abs(end - 1) > 1e-12)):
         raise ValueError(
             f"f{which_curve(int(i), shape)}: f(0) = 0 and f(1) = 1 are wanted, "

@@ -31,18 +31,9 @@ from rbcourse.so3 import hat
 class ProjectedPolynomial(Curve):
     """The `Curve` of the rotations nearest to a polynomial M(t) in the space of matrices.
 
+    Its `ends`, shape (..., n, 3, 3), are M(0), M(1), M'(0), M'(1), and for a quintic also M''(0),
+    M''(1), with time from 0 to 1. If there is a weight W, all matrices are multiplied by it.
     Source: BK 6, BK 6.2.
-
-    Attributes
-    ----------
-    ends : ndarray, shape (..., n, 3, 3)
-        M(0), M(1), M'(0), M'(1), and for a quintic also M''(0), M''(1), with time from 0 to 1. If
-        there is a weight W, all matrices are multiplied by it.
-    margin, margin_time : ndarray, shape (...)
-        The ``margin`` is the minimum over t of the sum of the two smallest eigenvalues of RᵀM,
-        where R is the projection of M. The minimum is reached at ``margin_time``. If the margin is
-        0, the nearest rotation is not unique. A small margin indicates a poor curve, but a large
-        margin does not guarantee a good curve (see docs/near_optimal.md).
     """
 
     ends: Array
@@ -57,10 +48,10 @@ class ProjectedPolynomial(Curve):
         R = np.ascontiguousarray(np.moveaxis(R, (-2, -1), (0, 1)))
         return np.moveaxis(_rates(R, *M)[order - 1], 0, -1)
 
-    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+    def _single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
         """Return R, w and w' of one curve at one time, as `textbook.projected_cubic` does."""
         if max(orders) > 2:
-            return super().single(i, t, orders)
+            return super()._single(i, t, orders)
         # the formulas of `_rates` without stacks take a third of the time
         ends = self.flat.ends[i]
         M = [hermite(ends, t, k) for k in range(max(orders) + 1)]
@@ -86,7 +77,11 @@ class ProjectedPolynomial(Curve):
 
     @property
     def margin(self) -> Array:
-        """The minimum over time of the sum of the two smallest eigenvalues of RᵀM."""
+        """The minimum over time of the sum of the two smallest eigenvalues of RᵀM.
+
+        If it is 0, the nearest rotation is not unique. A small margin indicates a poor curve, but a
+        large margin does not guarantee a good curve (see docs/near_optimal.md).
+        """
         return self._least_gap[1].copy()
 
     @property
@@ -118,13 +113,13 @@ class ProjectedPolynomial(Curve):
         least = self.least_margins(9)
         times, margins = np.full((2, self.count), np.inf)
         doubtful = np.flatnonzero(~(least >= 0.25))
-        times[doubtful], margins[doubtful] = self.flat.take(doubtful)._least_gap
+        times[doubtful], margins[doubtful] = self.flat._take(doubtful)._least_gap
         points = near_margins(super().breakpoints, times, margins)
         small = least > 1  # the margin of a curve that stands still is 2
         return [HALVES if here else there for here, there in zip(small, points, strict=True)]
 
 
-@described_by(returns="Curve")
+@described_by(between, returns="Curve")
 def projected_cubic(
     start: ArrayLike,
     goal: ArrayLike,
@@ -146,16 +141,9 @@ def projected_cubic(
 
     Parameters
     ----------
-    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotation matrices, or poses.
-    v0, v1 : array_like, shape (..., 3) or (..., 6), optional
-        The velocities at both ends in the body frame: angular velocities w for rotations, twists
-        (ω, v) for poses. The default is rest. `twist_from_rates` makes twists of ω and ḋ.
     body : Body, optional
         The body that moves, by default the ball of metric (12). Each principal moment is at most
         the sum of the other two, as for every real body.
-    duration : array_like, shape (...), optional
-        The duration of the motion; velocities are per unit of this time.
 
     Notes
     -----
@@ -254,7 +242,7 @@ def watched(curve: ProjectedPolynomial, bound: Array | None = None) -> Projected
         low = doubtful[part]
         low = low[_may_almost_jump(curve.flat.ends[low])]
         if len(low):
-            times[low], margins[low] = curve.flat.take(low)._least_gap
+            times[low], margins[low] = curve.flat._take(low)._least_gap
     if (margins < 1e-6).any():
         margins, times = margins.reshape(curve.batch_shape), times.reshape(curve.batch_shape)
         warn_if_nearly_singular(margins, times * curve.duration)

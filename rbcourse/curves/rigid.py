@@ -38,24 +38,18 @@ class _WithRotation(Curve):
         """The `Curve.breakpoints` of the rotation."""
         return self.rotation.breakpoints
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the same motion with another duration."""
-        return replace(self, duration=duration, rotation=self.rotation.lasting(duration))
+    def _lasting(self, duration: Array) -> Self:
+        return replace(self, duration=duration, rotation=self.rotation._lasting(duration))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RigidMotion(_WithRotation):
     """A `Curve` on SE(3): a rotation R(t), and a polynomial path of the body's centre of mass.
 
+    The `path`, shape (..., n, 3), has the positions of the centre of mass at t = 0 and 1. A cubic
+    also has the velocities, and a quintic the accelerations. The vectors are in m, in the fixed
+    frame, and time runs from 0 to 1.
     Source: BK 6.3.
-
-    Attributes
-    ----------
-    rotation : Curve on SO(3)
-    path : ndarray, shape (..., n, 3)
-        The position of the centre of mass at t = 0 and 1. A cubic also has the velocities, and a
-        quintic the accelerations. The vectors are in m, in the fixed frame, and time runs from 0 to
-        1.
     """
 
     path: Array
@@ -68,9 +62,8 @@ class RigidMotion(_WithRotation):
         position = np.moveaxis(hermite_stack(self._terms, t, order), 0, -1)
         return _of_rotation_and_path(self.body.centre, R, rates, position, order)
 
-    def single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
-        """Return derivatives of curve number i of the flat stack at one time from 0 to 1."""
-        R, *rates = self.rotation.single(i, t, tuple(range(max(orders) + 1)))
+    def _single(self, i: int, t: float, orders: tuple[int, ...]) -> list[Array]:
+        R, *rates = self.rotation._single(i, t, tuple(range(max(orders) + 1)))
         path, r = self.flat.path[i], self.body.centre
         return [_of_rotation_and_path(r, R, rates[:k], hermite(path, t, k), k) for k in orders]
 
@@ -124,13 +117,11 @@ class Joined(_WithRotation):
     def values(self, t: Array, order: int) -> Array:
         """Return the pose, or (w, Rᵀ d'), or (w', Rᵀ d'')."""
         rates = [self.rotation.values(t, order)] if order else []
-        path = self._positions(self.first + t * self.span, order) * self.span[:, None] ** order
-        return _of_rotation_and_path(np.zeros(3), self.rotation.values(t, 0), rates, path, order)
-
-    def _positions(self, t: Array, order: int) -> Array:
-        name, shape = f"position(t, {order})", (t.size, 3)
-        found = as_array(name, self.position(t.ravel(), order))
+        times = self.first + t * self.span
+        name, shape = f"position(t, {order})", (times.size, 3)
+        found = as_array(name, self.position(times.ravel(), order))
         if found.shape != shape:
             raise ValueError(f"{name}: shape {shape} is wanted, got {found.shape}")
         check_all(np.isfinite(found), name, found, "a finite number")
-        return found.reshape(*t.shape, 3)
+        path = found.reshape(*times.shape, 3) * self.span[:, None] ** order
+        return _of_rotation_and_path(np.zeros(3), self.rotation.values(t, 0), rates, path, order)

@@ -65,10 +65,9 @@ class SmoothedChain(Chain):
     period: Any
     noise: Any
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration; the first time is kept."""
+    def _lasting(self, duration: Array) -> Self:
         share = float(duration / self.duration)
-        return replace(super().lasting(duration), period=self.period * share)
+        return replace(super()._lasting(duration), period=self.period * share)
 
 
 def smoothing_spline(

@@ -21,7 +21,6 @@ from rbcourse.body import Body
 from rbcourse.curves._cells import BENDS, BLOCK, as_limits, fastest_motion
 from rbcourse.curves.chain import Chain
 from rbcourse.curves.curve import Curve
-from rbcourse.curves.ends import as_body
 
 TIMES = 20_001  # the times at which `limits_used` evaluates a curve
 PLATEAU = 1e-6  # the share below the maximum within which `limits_used` takes the first time
@@ -128,7 +127,7 @@ def fastest(
     if ends.min() < 0:
         raise ValueError(f"rates: two numbers from 0 up are wanted, got {rates}")
     s, rate, times = fastest_motion(given, known, ends**2)
-    moved = as_body(body, curve.body)
+    moved = known[0].body
     return Timed(duration=times[-1], body=moved, curve=given, s=s, rate=rate, times=times)
 
 
@@ -222,8 +221,7 @@ class Timed(Curve):
         """3 on SO(3), 4 on SE(3)."""
         return self.curve.size
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the same curve with another duration."""
+    def _lasting(self, duration: Array) -> Self:
         k = duration / self.duration
         return replace(self, duration=duration, rate=self.rate / k, times=self.times * k)
 
@@ -246,10 +244,9 @@ class Timed(Curve):
         below = np.where(t < self.times[-1], np.nextafter(last, -inf), self.s[-1])
         return np.clip(s, first, below), v + past * u, u
 
-    def evaluate(self, t: Array, order: int) -> Array:
-        """Return the values at the times t, shape (T, 1), by the chain rule."""
+    def _evaluate(self, t: Array, order: int) -> Array:
         s, v, u = (x[..., None] for x in self.progress(t))
-        return _composed(lambda k: self._path.evaluate(s[..., 0], k), v, u, order)
+        return _composed(lambda k: self._path._evaluate(s[..., 0], k), v, u, order)
 
     def _once(self, t: float, orders: tuple[int, ...]) -> list[Array]:
         s, v, u = (float(x) for x in self.progress(t))

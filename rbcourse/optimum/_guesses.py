@@ -65,10 +65,6 @@ class Curves:
         parts = [(one.problem, one.R, one.cost) for one in (self, *others)]
         return Curves(*map(np.concatenate, zip(*parts, strict=True)))
 
-    def renumbered(self, index: Numbers) -> Curves:
-        """Return the curves with the problem numbers index[0], index[1], … in place of 0, 1, …."""
-        return Curves(index[self.problem], self.R, self.cost)
-
     def on_nodes(self, n: int) -> Curves:
         return Curves.of(self.problem, on_nodes(self.R, n))
 

@@ -30,9 +30,9 @@ _FOUND = [
 ]
 
 
-def _reported(name: str, doc: str) -> Any:
+def _reported(name: str) -> Any:
     """Return a property of `Optimum`: a field of the report of its rotation."""
-    return property(lambda self: self._told(self.found.report[name]), doc=doc)
+    return property(lambda self: self._told(self.found.report[name]))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -69,28 +69,24 @@ class Optimum(Curve):
 
     @property
     def found(self) -> OptimalRotation:
-        """The optimal rotation."""
         raise NotImplementedError
 
     @property
     def cost(self) -> Any:
-        """The cost that the optimum minimises."""
         return self.found.cost
 
     @property
     def certified(self) -> Any:
-        """Whether the curve is proven to be a strict local minimum of its cost."""
         return self._told(self.found.positive.copy())
 
     @property
     def c(self) -> Array:
-        """The constant R p in the fixed frame."""
         return self.found.constant / self.duration[..., None] ** (self.found.functional.ends + 1)
 
-    converged = _reported("converged", "Whether a solution was found and no known one costs less.")
-    residual = _reported("residual", "The largest error of the equations.")
-    iterations = _reported("iterations", "The number of steps of the solver.")
-    nodes = _reported("nodes", "The number of nodes that represent the curve.")
+    converged = _reported("converged")
+    residual = _reported("residual")
+    iterations = _reported("iterations")
+    nodes = _reported("nodes")
 
     def _told(self, values: NDArray[Any]) -> Any:
         return values if self.batch_shape else values.item()
@@ -125,12 +121,12 @@ class OptimalRotation(Optimum):
     @cached_property
     def positive(self) -> NDArray[np.bool_]:
         """Whether the second variation is proven to be positive, shape (...)."""
-        proven = [is_positive(self.take([i])) for i in range(self.count)]
+        proven = [is_positive(self._take([i])) for i in range(self.count)]
         return np.array(proven, bool).reshape(self.batch_shape)
 
-    def take(self, index: Any) -> Self:
+    def _take(self, index: Any) -> Self:
         functional = self.functional.take(np.reshape(index, -1))
-        return replace(super().take(index), functional=functional)
+        return replace(super()._take(index), functional=functional)
 
     def values(self, t: Array, order: int) -> Array:
         """Return R or a derivative at the times t; R is orthogonal up to rounding."""
@@ -148,7 +144,7 @@ class OptimalRotation(Optimum):
         """
         times = as_time(t, 0, self.domain)
         orders = range(1, self.functional.ends + 2)
-        rates = [self.evaluate(times.reshape(-1, 1), order).swapaxes(0, 1) for order in orders]
+        rates = [self._evaluate(times.reshape(-1, 1), order).swapaxes(0, 1) for order in orders]
         p = np.reshape(self.functional.unit, (-1, 1, 1)) * self.functional.p(*rates)
         return p.swapaxes(0, 1).reshape(*times.shape, *self.batch_shape, 3)
 
@@ -205,23 +201,19 @@ class OptimalChain(Chain):
 
     @property
     def optimum(self) -> OptimalRotation:
-        """The rotations of the legs."""
         return self.legs.found
 
     @property
     def c(self) -> Array:
-        """The constant R p of each leg."""
         return self.optimum.c
 
     @property
     def certified(self) -> bool:
-        """Whether the chain is proven to be a strict local minimum."""
         return bool(self.definite and self.optimum.positive.all())
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration and the same start time."""
+    def _lasting(self, duration: Array) -> Self:
         share = float(duration / self.duration) ** (self.optimum.functional.ends + 1)
-        return replace(super().lasting(duration), cost=self.cost / share)
+        return replace(super()._lasting(duration), cost=self.cost / share)
 
     def _moved(self, L: Array, X: Array) -> Chain:
         parts = {name: getattr(self, name) for name in ("duration", "times", "legs", "velocities")}

@@ -172,7 +172,7 @@ class Search:
         again = np.isin(known.problem, problems)
         known = known.take(again).on_nodes(n)
         curves = self.task.starts(problems, n)
-        curves = curves.renumbered(problems).joined(known)
+        curves = Curves.of(problems[curves.problem], curves.R).joined(known)
         curves = curves.with_ends(self.ends)
         return lowered(self.functional, curves, self.first_steps)
 

@@ -145,7 +145,7 @@ def minimum_torque_spline(
     return _spline(times, rotations, conditions, as_body(body), "torque", long)
 
 
-@described_by(spline_velocities, minimum_acceleration_spline)
+@described_by(spline_velocities, minimum_torque_spline)
 def minimum_jerk_spline(
     times: ArrayLike, poses: ArrayLike, ends: PathEnds = "natural", *, long: ArrayLike = False
 ) -> OptimalChain:
@@ -156,8 +156,6 @@ def minimum_jerk_spline(
 
     Parameters
     ----------
-    poses : array_like, shape (N, 3, 3)
-        A rotation matrix for each of the times.
     ends : {"natural", "rest", "periodic"} or pair of array_like, optional
         "natural": the covariant jerk and its derivative are 0 at both ends. "rest": velocity and
         acceleration are 0 at both ends. "periodic": they are the same at both ends. A pair gives

@@ -139,10 +139,9 @@ class OptimalSmoothing(OptimalChain):
     def _what(self) -> str:
         return f"Optimum of acceleration near poses at {len(self.times)} times"
 
-    def lasting(self, duration: Array) -> Self:
-        """Return the chain with another duration; the first time is kept."""
+    def _lasting(self, duration: Array) -> Self:
         share = float(duration / self.duration)
-        return replace(super().lasting(duration), period=self.period * share)
+        return replace(super()._lasting(duration), period=self.period * share)
 
 
 def _rotations(problem: _Problem, noise: float | None, period: float | None) -> OptimalSmoothing:

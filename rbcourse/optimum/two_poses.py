@@ -25,6 +25,7 @@ from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, jerk
 from rbcourse.optimum._search import body as of_body
 
 
+@described_by(between)
 def minimum_acceleration(
     start: ArrayLike,
     goal: ArrayLike,
@@ -41,16 +42,9 @@ def minimum_acceleration(
 
     Parameters
     ----------
-    start, goal : array_like, shape (..., 3, 3) or (..., 4, 4)
-        Rotation matrices, or poses.
-    v0, v1 : array_like, shape (..., 3) or (..., 6), optional
-        The velocities at both ends in the body frame: angular velocities w for rotations, twists
-        (ω, v) for poses. The default is rest. `twist_from_rates` makes twists of ω and ḋ.
     body : Body, optional
         The body that moves: one for all problems of a stack, or one for each problem. The default
         is the ball of metrics (12) and (14).
-    duration : array_like, shape (...), optional
-        The duration of the motion; velocities are per unit of this time.
 
     Returns
     -------
@@ -79,13 +73,12 @@ def minimum_acceleration(
     Newton's method solves R p = c, starting from the cheapest of several curves, which turn the
     short way or the long way. The result is stationary, and ``certified`` tells whether it is
     proven to be a local minimum. It is not proven that no other curve costs less, even if
-    ``converged`` is True. For one of 300 balls with speeds of 15 to 30 at both ends, sixteen random
-    starts of another optimiser found a cheaper curve (by 1.2 %). See docs/near_optimal.md for
-    bodies. For very thin rods, the method may not converge. If the end velocities are along the
-    geodesic, the optimum is R0 exp(σ̂ p(t)), where p is a cubic and σ is a logarithm of R0ᵀR1 (not
-    always the shortest logarithm). For poses, the mass changes the cost of the motion, but not the
-    motion. `closed_forms.corrected_bezier` and `projected_cubic` are near-optimal, and
-    `rbcourse.textbook` solves (19) by SciPy's `solve_bvp` and by shooting.
+    ``converged`` is True, and for very thin rods, the method may not converge (docs/near_optimal.md
+    has tests). If the end velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)), where
+    p is a cubic and σ is a logarithm of R0ᵀR1 (not always the shortest logarithm). For poses, the
+    mass changes the cost of the motion, but not the motion. `closed_forms.corrected_bezier` and
+    `projected_cubic` are near-optimal, and `rbcourse.textbook` solves (19) by SciPy's `solve_bvp`
+    and by shooting.
 
     Examples
     --------
@@ -139,12 +132,10 @@ def minimum_torque(
     Notes
     -----
     The method, errors, warnings and singular set are those of `minimum_acceleration`. The curve of
-    a rod may not be the cheapest one, even if ``converged`` is True: for 3 of 600 rods with moments
-    (1, 6 to 10, up to 1 more), angles up to π and speeds up to 9, another optimiser found a curve
-    that is cheaper, by 0.5, 3.5 and 6.3 %. For thin rods, the method often does not converge. A
-    turn about a principal axis is a stationary curve; about the axis of the largest moment of
-    inertia, it may be a saddle. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c
-    (`rbcourse.textbook.minimum_torque`).
+    a rod may not be the cheapest one, even if ``converged`` is True, and for thin rods, the method
+    often does not converge (docs/near_optimal.md has tests). A turn about a principal axis is a
+    stationary curve; about the axis of the largest moment of inertia, it may be a saddle. With J =
+    R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c (`rbcourse.textbook.minimum_torque`).
 
     Examples
     --------
@@ -164,7 +155,7 @@ def minimum_torque(
     return _solved(of_body(given.ends, given.body.inertia, of_torque=True), given)
 
 
-@described_by(minimum_acceleration)
+@described_by(minimum_torque)
 def minimum_jerk(
     start: ArrayLike,
     goal: ArrayLike,
@@ -181,8 +172,6 @@ def minimum_jerk(
 
     Parameters
     ----------
-    start, goal : array_like, shape (..., 3, 3)
-        Rotation matrices.
     v0, v1, a0, a1 : array_like, shape (..., 3), optional
         The angular velocities w and accelerations w' at both ends in the body frame, by default 0.
 
