@@ -1,4 +1,4 @@
-"""The four ways between two orientations, and the belt, agree with their definitions."""
+"""The belt agrees with its definition, and the ways between two orientations differ."""
 
 import numpy as np
 import pytest
@@ -8,57 +8,7 @@ import rbcourse as rb
 
 X, Y, Z = np.eye(3)
 BOX = np.array([0.65, 0.4, 0.125])
-PANELS = {  # the limits of each picture in pixels, below its name
-    "ZYX angles": ((0, 280), (190, 358)),
-    "matrix entries": ((280, 560), (190, 358)),
-    "quaternions": ((0, 280), (0, 168)),
-    "rotation vectors": ((280, 560), (0, 168)),
-}
-
-
-def ways(angles, t):
-    """Return the matrices of the four ways between two triples of angles, without quaternions."""
-    ends = [rb.exp_so3(a * Z) @ rb.exp_so3(b * Y) @ rb.exp_so3(c * X) for a, b, c in angles]
-    (a, b, c), (r0, r1) = angles[0] + t * (angles[1] - angles[0]), map(rb.log_so3, ends)
-    turn = rb.log_so3(ends[0].T @ ends[1])
-    return ends, {
-        "ZYX angles": rb.exp_so3(a * Z) @ rb.exp_so3(b * Y) @ rb.exp_so3(c * X),
-        "matrix entries": (1 - t) * ends[0] + t * ends[1],
-        "quaternions": ends[0] @ rb.exp_so3(t * turn),
-        "rotation vectors": rb.exp_so3((1 - t) * r0 + t * r1),
-    }
-
-
-@pytest.mark.source("RR 2.1", "RR 2.2", "BK 2.5")
-def test_four_ways_lead_from_the_start_to_the_goal():
-    for v, said, artists in sweep("interpolation", t=0.3):
-        angles = np.radians(
-            [[v[f"{name}{i}"] for name in ("yaw", "pitch", "roll")] for i in (0, 1)]
-        )
-        ends, wanted = ways(angles, v["t"])
-        apart = np.degrees(rb.angle_between(*ends))
-        for way, M in wanted.items():
-            box = artists[way]
-            if way == "quaternions" and apart > 179.99:  # there are two short arcs
-                M = box.corners[:6].mean(axis=1)[:3].T / BOX
-                assert off(M @ M.T, np.eye(3)) < 1e-12
-                assert np.degrees(rb.angle_between(ends[0], M)) == pytest.approx(180 * v["t"])
-            assert_box(box, M, BOX, turned=1e-7)  # half of the digits are lost at half-turns
-            path, start, goal, nose = (
-                points(artists[f"{way} {part}"]) for part in ("path", "start", "goal", "nose")
-            )
-            for line, place in ((path, 0), (start, 0), (path, -1), (goal, -1)):
-                assert off(line[place], ends[place][:, 0]) < 1e-7
-            assert off(nose, np.outer([0.65, 1], M[:, 0])) < 1e-7
-            assert_seen(box.axes, np.concatenate([path, nose, *box.corners]), *PANELS[way])
-        assert reads(said["quaternions"], apart)
-        assert reads(said["matrix entries"], np.linalg.det(wanted["matrix entries"]))
-        t = np.linspace(0, 1, 1001)[:, None]
-        blended = rb.matrix_from_zyx(angles[0] + t * (angles[1] - angles[0]))
-        travelled = np.degrees(rb.angle_between(blended[:-1], blended[1:]).sum())
-        assert reads(said["ZYX angles"], travelled)
-        for way in ("ZYX angles", "rotation vectors"):  # no way is shorter than the short arc
-            assert float(said[way].split("°")[0]) > apart - 0.51
+WAYS = "ZYX angles", "matrix entries", "quaternions", "rotation vectors"
 
 
 def test_the_first_ways_differ_and_the_blended_matrix_is_squashed():
@@ -71,7 +21,7 @@ def test_the_first_ways_differ_and_the_blended_matrix_is_squashed():
         "quaternions": "102° in all",
         "rotation vectors": "271° in all",
     }
-    turns = [four.artists[way].corners[:6].mean(axis=1)[:3].T / BOX for way in PANELS]
+    turns = [four.artists[way].corners[:6].mean(axis=1)[:3].T / BOX for way in WAYS]
     zyx, _, short, vectors = turns
     for pair in ((zyx, short), (zyx, vectors), (short, vectors)):
         assert np.degrees(rb.angle_between(*pair)) > 50
@@ -131,16 +81,7 @@ def test_the_belt_joins_the_ceiling_to_the_plate():
     ("turn", "untwist", "texts"),
     [
         (0, 0, ("as at the start", "1.00", "straight", "not needed: q = 1")),
-        (
-            90,
-            1,
-            (
-                "turned by 90°",
-                "0.71",
-                "still twisted by 90°",
-                "impossible: the plate would have to",
-            ),
-        ),
+        (90, 1, ("turned by 90°", "0.71", "still twisted by 90°", "impossible: the plate")),
         (360, 0.5, ("as at the start", "-1.00", "still twisted by 360°", "impossible: the plate")),
         (720, 0, ("as at the start", "1.00", "twisted by 720°", "possible, as q = 1")),
         (720, 0.5, ("as at the start", "1.00", "partly untwisted", "possible, as q = 1")),
