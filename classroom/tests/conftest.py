@@ -2,12 +2,10 @@
 
 import os
 import shutil
-from functools import cache
 from pathlib import Path
 
 import pytest
 from packages import find_program
-from sweeps import made
 
 from rbclassroom.assignments import sandbox
 from rbclassroom.course.lab import configure
@@ -39,14 +37,25 @@ def pages_for(named):
     return ""
 
 
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory):
+    """Return a folder that all workers share."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "Kurs ä"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="module", autouse=True)
-def few_states(request):
-    """Let pages have explorers with few states, which are recorded in less than a second."""
+def few_states(request, shared):
+    """Let pages have explorers with a fifth of the states; each is recorded once."""
     with pytest.MonkeyPatch.context() as patch:
-        if request.path.parent.name in ("book", "lecture"):
+        if request.path.parent.name in ("book", "browser", "lecture"):
             from rbclassroom.explorers import recorded
 
-            patch.setattr(recorded, "living", recorded_briefly)
+            fewer = {name: (moved, 5 * stride) for name, (moved, stride) in recorded.MOVED.items()}
+            patch.setattr(recorded, "MOVED", fewer)
+            patch.setattr(recorded, "_stored", lambda name: shared / f"{name}.html")
             patch.setattr(recorded, "record_all", lambda: None)
         yield
 
@@ -68,15 +77,6 @@ def release(tmp_path_factory):
     folder = tmp_path_factory.mktemp("assignments")
     write_tiny_set(folder)
     return handout.release("ps0", folder)["ps0.ipynb"].decode()
-
-
-@cache
-def recorded_briefly(name):
-    from rbclassroom.explorers import recorded
-
-    explorer = made(name)
-    explorer.restart()
-    return recorded.record(explorer, f"{name}_explorer", {}, stride=40)._repr_html_()
 
 
 @pytest.hookimpl(tryfirst=True)

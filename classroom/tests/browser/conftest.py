@@ -12,7 +12,8 @@ from pages import watched
 from playwright.sync_api import expect, sync_playwright
 from servers import serving
 
-from rbcourse.files import replace_file
+from rbclassroom.book.build import build
+from rbclassroom.live import engine
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = str(ROOT), str(ROOT / "classroom")
@@ -37,21 +38,22 @@ def context():
         chromium.close()
 
 
-@pytest.fixture(scope="session")
-def book(tmp_path_factory):
-    """Make the book, once for all workers."""
-    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", os.getpid())
-    done = tmp_path_factory.getbasetemp().parent / f"book-{run}"
+@pytest.fixture(scope="module")
+def book(few_states, shared):
+    """Make the book, once for all workers; return its folder."""
+    done = shared / "done"
     try:
-        done.with_suffix(".begun").touch(exist_ok=False)
+        (shared / "begun").touch(exist_ok=False)
     except FileExistsError:
         while not done.exists():  # another worker makes it
             time.sleep(0.2)
     else:
-        words = [sys.executable, "-m", "rbclassroom.book.build", "--live"]
-        code = subprocess.run(words, cwd=ROOT, stdout=subprocess.DEVNULL).returncode
-        replace_file(done, str(code).encode())
-    assert done.read_text() == "0", "the book could not be made"
+        try:
+            build(ROOT, shared / "book", pyodide=engine.fetch())
+        finally:
+            done.touch()
+    assert (shared / "book").exists(), "the book could not be made"
+    return shared / "book"
 
 
 @pytest.fixture(scope="session")
@@ -72,8 +74,8 @@ def home(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def lab(home, tmp_path_factory):
-    """Return a function ``lab(path)`` that gives the JupyterLab address of a path, with the
-    token. JupyterLab renders all cells, also those outside of its window."""
+    """Start JupyterLab in the folder work/; return its address with the token. JupyterLab renders
+    all cells, also those outside of its window."""
     course, env = home
     settings = tmp_path_factory.mktemp("settings")
     own = settings / "@jupyterlab" / "notebook-extension" / "tracker.jupyterlab-settings"
@@ -85,9 +87,9 @@ def lab(home, tmp_path_factory):
         words.append("--allow-root")
     configured = env | {"JUPYTER_CONFIG_PATH": str(Path(sys.prefix, "share", "rbcourse"))}
     configured["JUPYTERLAB_SETTINGS_DIR"] = str(settings)
-    address = r"(http://127\.0\.0\.1:\d+)/lab\?(token=\w+)"
+    address = r"http://127\.0\.0\.1:\d+/lab\?token=\w+"
     with serving(words, course, configured, address) as server:
-        yield lambda path: f"{server[1]}/lab/{path}?{server[2]}"
+        yield server[0]
 
 
 @pytest.fixture

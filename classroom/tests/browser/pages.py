@@ -52,19 +52,7 @@ def watched(context):
     page.on("console", lambda m: known.search(f"{m.type} {m.text}") or faults.append(m.text))
     yield page
     page.close()
-    assert faults == []
-
-
-def open_in_lab(page, address):
-    """Open a notebook in JupyterLab, and wait until its cells are shown."""
-    page.goto(address)
-    page.locator(".jp-NotebookPanel .jp-Cell").first.wait_for()
-
-
-def run_all(page):
-    """Wait until the kernel is idle, and start all cells."""
-    page.get_by_text(IDLE).wait_for()
-    page.evaluate("jupyterapp.commands.execute('notebook:run-all-cells')")
+    assert not faults, faults
 
 
 def wait_for(explorer):
@@ -73,11 +61,6 @@ def wait_for(explorer):
     explorer.locator("table").wait_for()
     explorer.get_by_role("img").wait_for()  # a canvas gets this role once it is drawn
     return explorer
-
-
-def centre(explorer):
-    """Scroll an explorer to the middle of the screen."""
-    explorer.evaluate("(explorer) => explorer.scrollIntoView({ block: 'center' })")
 
 
 def move_every_control(explorer):

@@ -1,4 +1,4 @@
-"""Test lessons in JupyterLab: stored copies, running explorers, and originals."""
+"""Test JupyterLab: stored lessons, votes, running explorers, and originals."""
 
 import html
 import re
@@ -6,11 +6,24 @@ import shutil
 
 import nbformat
 import pytest
-from pages import FRAMES, IDLE, SEEN, open_in_lab, wait_for
+from pages import (
+    FRAMES,
+    IDLE,
+    SEEN,
+    check_alike,
+    move_every_control,
+    shown,
+    wait_for,
+    watched,
+)
 from playwright.sync_api import expect
+
+from rbclassroom import explorers
+from rbclassroom.course.notebooks import KERNEL
 
 PANEL = "jupyterapp.shell.currentWidget"
 DIRTY = f"{PANEL}.context.model.dirty"
+OPEN = "async (path) => void (await jupyterapp.commands.execute('docmanager:open', { path }))"
 # A function that tests whether all pictures with the given descriptions are shown, and no others.
 WHOLE = """(wanted) => {
   const pictures = [...document.querySelectorAll(".jp-Cell figure :is(img, canvas)")];
@@ -31,24 +44,68 @@ PAUSE = """async (explorer) => {
   while (parseFloat(number.innerText) < 0.1) await new Promise(requestAnimationFrame);
   explorer.querySelector("button").click();
 }"""
+# A function that records when keys go down, and when the screen shows a new picture.
+NOTE = """() => {
+  window.keys = []; window.pictures = [];
+  let frame = null;
+  const show = () => { frame = null; pictures.push(performance.now()); };
+  document.addEventListener("keydown", () => keys.push(performance.now()), true);
+  document.addEventListener("drawn", () => { frame ??= requestAnimationFrame(show); });
+}"""
+WIDE = """async (canvas) => {
+  const drawn = new Promise((done) => canvas.addEventListener("drawn", done));
+  Object.assign(canvas.style, { width: "1120px", maxWidth: "none" });
+  await drawn;
+}"""
+TIMES = "() => new Promise((done) => requestAnimationFrame(() => done([keys, pictures])))"
+# Explorers that can be clicked, in the plane with a menu, and in space with buttons, and one that
+# solves a problem for each picture. Each entry also has the place and the name of the slider that
+# the test moves.
+KINDS = {"arm": (1, "theta0"), "chain": (1, "duration"), "flip": (1, "off"), "cube": (2, "spin")}
+
+
+@pytest.fixture(scope="module")
+def page(context, lab):
+    """Return a page with JupyterLab, which all tests of this module share."""
+    with watched(context) as page:
+        page.goto(lab)
+        page.wait_for_function("window.jupyterapp")
+        page.evaluate("jupyterapp.restored.then(() => true)")
+        yield page
 
 
 @pytest.fixture
-def opened(home, lab, page):
-    """Return a function that opens a copy of a lesson: ``opened("06_geodesics", "mine")``.
+def opened(home, page):
+    """Return a function that opens a notebook of the folder work/, and returns its path."""
 
-    The function returns the path of the copy.
-    """
-    page.set_viewport_size({"width": 1280, "height": 30_000})  # all pictures are in the window
-
-    def open_(lesson, name):
-        path = home[0] / "work" / f"{lesson}.ipynb"
-        shutil.copy(path, path.with_stem(name))
-        open_in_lab(page, lab(f"workspaces/{name}/tree/{name}.ipynb"))
+    def open_(name):
+        page.evaluate(OPEN, name)
+        page.wait_for_function(f"(path) => {PANEL}?.context?.path === path", arg=name)
+        page.locator(".jp-NotebookPanel .jp-Cell").first.wait_for()
         page.get_by_text(IDLE).wait_for()
-        return path.with_stem(name)
+        return home[0] / "work" / name
 
-    return open_
+    yield open_
+    page.evaluate(f"void {PANEL}.dispose()")
+
+
+@pytest.fixture
+def running(home, opened, page):
+    """Run explorers in a notebook, and return their elements."""
+    cells = ["from rbclassroom import explorers"]
+    cells += [f"explorers.{name}_explorer()" for name in KINDS]
+    notebook = nbformat.v4.new_notebook(metadata={"kernelspec": KERNEL})
+    notebook.cells = [nbformat.v4.new_code_cell(source) for source in cells]
+    nbformat.write(notebook, home[0] / "work" / "explorers.ipynb")
+    page.set_viewport_size({"width": 1280, "height": 5000})  # all explorers are in the window
+    opened("explorers.ipynb")
+    page.evaluate("jupyterapp.commands.execute('notebook:run-all-cells')")
+    there = page.locator(".rbcourse-explorer")
+    expect(there).to_have_count(len(KINDS))
+    for element in there.all():
+        wait_for(element)
+    page.set_viewport_size({"width": 1280, "height": 800})
+    return there.all()
 
 
 def run_explorer(page, path):
@@ -70,7 +127,8 @@ def descriptions(path):
 
 def test_a_stored_lesson_is_complete_and_its_explorer_works(opened, page):
     """Without a kernel, the explorer shows an error; reopened, the lesson has a still picture."""
-    path = opened("06_geodesics", "stored")
+    page.set_viewport_size({"width": 1280, "height": 30_000})  # all pictures are in the window
+    path = opened("06_geodesics.ipynb")
     stored = descriptions(path)
     assert len(stored) > 3
     page.wait_for_function(WHOLE, arg=stored)
@@ -88,14 +146,16 @@ def test_a_stored_lesson_is_complete_and_its_explorer_works(opened, page):
     assert explorer.locator("tr").count() == 0
     page.evaluate(f"{PANEL}.context.save()")
     page.wait_for_function(f"!{DIRTY}")
-    page.reload()
+    page.evaluate(f"void {PANEL}.dispose()")
+    opened("06_geodesics.ipynb")
     page.wait_for_function(WHOLE, arg=stored)
     still = page.get_by_role("img", name=re.compile(r"^The line and its shadow\. θ\(t\): "))
     expect(still).to_have_js_property("tagName", "IMG")
+    page.set_viewport_size({"width": 1280, "height": 800})
 
 
 def test_a_vote_opens_the_answer_and_shift_enter_passes_it(opened, page):
-    path = opened("01_plane", "votes")
+    path = opened("01_plane.ipynb")
     ids = [cell.id for cell in nbformat.read(path, as_version=4).cells]
     state = f"""(place) => {{
       const notebook = {PANEL}.content;
@@ -132,9 +192,43 @@ def settled(page, text):
     return now
 
 
-def test_keys_start_and_reset_an_explorer(opened, page):
-    explorer = run_explorer(page, opened("02_two_link_arm", "play"))
+def test_explorers_follow_keys_and_clicks(running, page):
     assert page.evaluate(SEEN) == []
+    check_play_and_clicks(running[0], page)
+    page.evaluate(NOTE)
+    for (name, slider), element in zip(KINDS.items(), running, strict=True):
+        explorer, canvas = getattr(explorers, f"{name}_explorer")(), element.locator("canvas")
+        element.get_by_role("button", name="Reset").press("Enter")
+        expect(canvas).to_have_attribute("aria-label", starting_with(explorer))
+        style = canvas.get_attribute("style")
+        canvas.evaluate(WIDE)
+        want = explorer.draw(explorer.state().shown, zoom=2)
+        check_alike(shown(canvas), want, explorer.background)
+        canvas.evaluate("(canvas, style) => { canvas.style = style; }", style)
+        keys, pictures = press(element, explorer, *slider, *["ArrowRight"] * 15)
+        after = [picture - keys[-1] for picture in pictures if picture > keys[-1]]
+        # at most three pictures follow the keys: one in transit, one being drawn, and the last one
+        assert len(after) <= 3, f"{name}: pictures lag behind keys that are held down"
+        move_every_control(element)
+
+
+def starting_with(explorer):
+    return re.compile("^" + re.escape(repr(explorer)))
+
+
+def press(element, explorer, place, name, *keys):
+    """Press keys on a slider; wait for the last picture; return the times of keys and pictures."""
+    element.locator(".noUi-handle").nth(place).focus()
+    element.page.evaluate("keys.length = pictures.length = 0")
+    for key in keys:
+        element.page.keyboard.press(key)
+    text = element.locator(".widget-slider .widget-readout").nth(place).inner_text()
+    explorer.put(**{name: float(text.replace("−", "-"))})
+    expect(element.locator("canvas")).to_have_attribute("aria-label", starting_with(explorer))
+    return element.page.evaluate(TIMES)
+
+
+def check_play_and_clicks(explorer, page):
     time, play = explorer.locator(".widget-readout").first, explorer.locator("button").first
     expect(time).to_have_text("0.00")
     play.press("Enter")
@@ -167,20 +261,14 @@ def test_keys_start_and_reset_an_explorer(opened, page):
     assert page.evaluate(SEEN) == []
 
 
-def test_a_changed_original_is_not_saved(home, lab, page):
+def test_a_changed_original_is_not_saved(home, opened, page):
     work = home[0] / "work"
-    original = work / "notebooks" / "01_plane.ipynb"
     for folder in ("notebooks", "work"):
         (work / folder).mkdir()
-    stored = (work / original.name).read_bytes()
-    original.write_bytes(stored)
+    shutil.copy(work / "01_plane.ipynb", work / "notebooks")
     (work / "work" / ".copied.json").write_text('{"01_plane.ipynb": []}')
-    open_in_lab(page, lab("workspaces/original/tree/notebooks/01_plane.ipynb"))
-    page.get_by_text(IDLE).wait_for()
-    page.evaluate(f"{PANEL}.context.model.setMetadata('touched', true)")
-    page.evaluate("jupyterapp.commands.execute('docmanager:save')")
-    page.wait_for_function(f"!{DIRTY}")
-    assert original.read_bytes() == stored
+    original = opened("notebooks/01_plane.ipynb")
+    stored = original.read_bytes()
     page.evaluate(f"{PANEL}.context.model.cells.get(0).sharedModel.setSource('# Mine')")
     page.evaluate("void jupyterapp.commands.execute('docmanager:save')")
     page.get_by_text("Your copy is in work/").first.wait_for()

@@ -31,10 +31,7 @@ from rbclassroom.book.serve import Handler
 from rbclassroom.live import engine
 from rbclassroom.live.pages import LEFT_OUT
 
-pytestmark = pytest.mark.usefixtures("book")
 ROOT = Path(__file__).parents[3]
-BOOK = ROOT / "book"
-LIVE = BOOK / "_static" / "live"
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
 RUN = """async ([cell, page]) => {
   const set = page && (await (await fetch(`${rbcourseEngine.folder}pages/${page}.json`)).json());
@@ -49,10 +46,10 @@ RUN = """async ([cell, page]) => {
 OUTPUTS = ":is(.outputs pre, .outputs .hint, .outputs figure)"
 
 
-@pytest.fixture(scope="session")
-def address():
+@pytest.fixture(scope="module")
+def address(book):
     """Return the address at which this machine serves the book."""
-    handler = partial(Handler, directory=str(BOOK))
+    handler = partial(Handler, directory=str(book))
     with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://127.0.0.1:{server.server_port}"
@@ -112,8 +109,8 @@ def test_each_cell_gives_its_stored_text_unless_it_is_an_exception(run, path):
     assert differ == listed.keys()
 
 
-def test_at_least_250_cells_can_be_run():
-    pages = [path.read_text("utf-8") for path in (BOOK / "lessons").glob("[0-9]*.html")]
+def test_at_least_250_cells_can_be_run(book):
+    pages = [path.read_text("utf-8") for path in (book / "lessons").glob("[0-9]*.html")]
     assert sum(len(re.findall(r"\btag_try-", page)) for page in pages) >= 250
 
 
@@ -149,22 +146,22 @@ def test_reference_answers_pass_and_wrong_ones_get_their_hints(run, name):
 def opened(page, address, name):
     page.goto(f"{address}/{name}")
     page.wait_for_load_state("networkidle")
-    return page
 
 
-def test_nothing_is_loaded_before_the_reader_acts(page, address):
+def test_cells_load_python_only_when_they_run_and_can_be_changed(page, book, address):
     """The first result loads at most 10 MB, and the first figure at most 20 MB. All files are from
     this server."""
     asked = []
     page.on("request", lambda request: asked.append(request))
     page.on("dialog", lambda dialog: dialog.accept())
-    opened(page, address, "lessons/01_plane.html")
+    opened(page, address, "lessons/06_geodesics.html")
     assert {Path(r.url).name.partition("?")[0] for r in asked if "/live/" in r.url} == {
         *("live.css", "engine.js", "live.js")
     }
-    sizes = {path.name: path.stat().st_size for path in LIVE.glob("*.*")}
+    sizes = {path.name: path.stat().st_size for path in (book / "_static/live").glob("*.*")}
     page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
-    for cell, most in (("cell-13", 10e6), ("cell-14", 20e6)):
+    before = page.locator(".tag_try-cell-04 .cell_output").get_by_role("button").count()
+    for cell, most in (("cell-12", 10e6), ("cell-04", 20e6)):
         part = page.locator(f".tag_try-{cell}")
         part.get_by_role("button", name="Try it").click()
         part.locator(OUTPUTS).first.wait_for()
@@ -173,13 +170,6 @@ def test_nothing_is_loaded_before_the_reader_acts(page, address):
     expect(page.locator(".differences")).to_have_count(1)
     expect(page.locator(".differences")).to_contain_text("32 bits")
 
-
-def test_a_changed_cell_can_be_stopped_and_reset(page, address):
-    opened(page, address, "lessons/06_geodesics.html")
-    page.locator(".content details").evaluate_all("(all) => all.forEach((x) => { x.open = true; })")
-    part = page.locator(".tag_try-cell-04")
-    before = part.locator(".cell_output").get_by_role("button").count()
-    part.get_by_role("button", name="Try it").click()
     expect(part.locator(".outputs figure canvas")).to_be_visible()  # this picture can be turned
     expect(part.locator(".cell_output canvas")).to_be_visible()
     code = part.locator(".cm-content")
@@ -198,9 +188,8 @@ def test_a_changed_cell_can_be_stopped_and_reset(page, address):
     assert part.locator(".cell_output").first.get_by_role("button").count() == before
 
 
-def test_outputs_appear_below_their_own_cells(page, address):
-    """Two cells are run at the same time, and one cell is run twice."""
-    opened(page, address, "problems/ps1.html")
+def check_outputs_of_two_cells(page):
+    """Run two cells at the same time, twice; the outputs appear below their own cells."""
     for number, code in enumerate(("import time\ntime.sleep(2)\nprint('one')", "print('two')")):
         write(page, number, code)
     checks = page.get_by_role("button", name="Check")
@@ -226,11 +215,11 @@ def test_a_second_visit_uses_stored_files(context, address):
             assert page.evaluate(stored) == 1
 
 
-def test_pages_opened_as_files_explain_what_is_missing(page):
-    page.goto((BOOK / "problems/ps1.html").as_uri())
+def test_pages_opened_as_files_explain_what_is_missing(page, book):
+    page.goto((book / "problems/ps1.html").as_uri())
     page.get_by_role("button", name="Check").first.click()
     expect(page.locator(".outputs .error").first).to_contain_text("web server")
-    page.goto((BOOK / "lessons/04_nearest_rotation.html").as_uri())
+    page.goto((book / "lessons/04_nearest_rotation.html").as_uri())
     page.locator(".try:visible").first.click()
     expect(page.locator(".outputs .error")).to_contain_text("book --live --serve")
 
@@ -251,6 +240,7 @@ def test_a_set_solved_in_the_book_can_be_graded(page, address, tmp_path, capsys)
     right = [re.sub(r" *### (BEGIN|END) SOLUTION\n?", "", text) for text in sources.values()]
     opened(page, address, "problems/ps1.html")
     assert page.locator(".editor").count() == len(right)
+    check_outputs_of_two_cells(page)
     start, _ = head("ps1", "pose-matrix")
     body = TABLES["ps1"]["pose-matrix"]["mistakes"][0]["code"][0]
     write(page, 0, start + indent(body.strip(), "    "))
@@ -334,7 +324,7 @@ def test_functions_of_a_set_stay_in_the_browser_for_later_sets(page, address, tm
     expect(setup.locator(".outputs pre")).to_contain_text("exp_so3: the course's")
 
 
-def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
+def test_no_file_of_the_site_reveals_solutions_or_hidden_tests(book):
     """Search for hidden tests, mark schemes and model answers; for some reversed or as base64."""
     kinds = "SOLUTION|HIDDEN TESTS|MARK SCHEME"
     secrets = {line for name in SETS for line in regions(name, kinds) if len(line) >= 30}
@@ -347,7 +337,7 @@ def test_no_file_of_the_site_reveals_solutions_or_hidden_tests():
     shifts = [(b"xyz"[:k] + line.encode(), k) for line in some for k in range(3)]
     forms |= {base64.b64encode(text)[4 if k else 0 : -8] for text, k in shifts}
     others = {*engine.FILES, *map("{}.packed".format, engine.PACKED)}
-    for path in BOOK.rglob("*.*"):
+    for path in book.rglob("*.*"):
         if path.is_file() and path.suffix not in (".png", ".gif") and path.name not in others:
             content = path.read_bytes()
             if path.suffix == ".zip":

@@ -17,9 +17,7 @@ from rbclassroom.lecture.deck import write
 from rbclassroom.lecture.slides import deck_of
 from rbcourse.draw.save import SHOWN
 
-pytestmark = pytest.mark.usefixtures("book")
 ROOT = Path(__file__).parents[3]
-SLIDES = ROOT / "book" / "slides"
 LESSONS = sorted((ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
 FAULTS, FORMULAS = (
     Path(__file__).with_name(f"{name}.js").read_text(encoding="utf-8")
@@ -28,6 +26,20 @@ FAULTS, FORMULAS = (
 PICTURES = """() => [...document.querySelectorAll(".slides section section")]
   .flatMap((section, i) => [...section.querySelectorAll("figure > img")].map((image) => [
     i + 1, image.alt, image.naturalWidth]))"""
+# Move each slider, and return the labels of those that do not work: the value beside them, or the
+# picture, stays the same.
+DEAD = """() => [...sections].flatMap((section) => {
+  Reveal.slide(...Object.values(Reveal.getIndices(section)));
+  return [...section.querySelectorAll("input[type=range]")].filter((slider) => {
+    const output = slider.parentElement.querySelector("output"), before = output.textContent;
+    const canvas = section.querySelector("canvas"), picture = canvas.toDataURL();
+    slider.value = +slider.value === +slider.max ? 0 : slider.max;
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+    const same = output.textContent === before || canvas.toDataURL() === picture;
+    // the belt is untwisted only after a turn by 720°
+    return same && slider.ariaLabel !== "untwist (0 to 1)";
+  }).map((slider) => `slider ${slider.ariaLabel}`);
+})"""
 HERE = "() => Reveal.getCurrentSlide().innerText"
 SLIDE = "section.present > section.present"
 
@@ -55,8 +67,10 @@ def opened(page, address):
     return page
 
 
-def of(path):
-    return (SLIDES / f"{path.stem}.html").as_uri()
+@pytest.fixture
+def of(book):
+    """Return a function that gives the address of a deck."""
+    return lambda path: (book / "slides" / f"{path.stem}.html").as_uri()
 
 
 @pytest.mark.parametrize(
@@ -67,18 +81,18 @@ def of(path):
     ],
 )
 @pytest.mark.parametrize("path", quick_for(["06"], LESSONS))
-def test_every_slide_fits_and_is_legible_from_the_last_row(context, path, size, key):
-    with watched(context) as page:
-        page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
-        opened(page, of(path))
-        if key:
-            page.keyboard.press(key)
-        pictures = page.evaluate(PICTURES)
-        faults, thin, widths = page.evaluate(FAULTS)
-        for width in (1280, 1920, 3840):
-            page.set_viewport_size({"width": width, "height": width * 9 // 16})
-            page.wait_for_function(f"Math.abs(Reveal.getScale() - {width} / 1920) < 0.01")
-            faults += [f"{width} pixels, slide {fault}" for fault in page.evaluate(FORMULAS)]
+def test_every_slide_fits_and_is_legible_from_the_last_row(page, of, path, size, key):
+    page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+    opened(page, of(path))
+    if key:
+        page.keyboard.press(key)
+    pictures = page.evaluate(PICTURES)
+    faults, thin, widths = page.evaluate(FAULTS)
+    for width in (1280, 1920, 3840):
+        page.set_viewport_size({"width": width, "height": width * 9 // 16})
+        page.wait_for_function(f"Math.abs(Reveal.getScale() - {width} / 1920) < 0.01")
+        faults += [f"{width} pixels, slide {fault}" for fault in page.evaluate(FORMULAS)]
+    faults += page.evaluate(DEAD)
     assert faults == []
     assert len(thin) <= 3, thin
     for number, alt, pixels in pictures:  # the smallest letters have 13.5 points
@@ -87,46 +101,17 @@ def test_every_slide_fits_and_is_legible_from_the_last_row(context, path, size, 
         assert letters > 0.025 * 1080, (number, alt, letters)
 
 
-# Move each slider of the slide that is shown, and return the labels of those that do not work:
-# the value beside them, or the picture, stays the same.
-DEAD = """() => {
-  const section = Reveal.getCurrentSlide(), found = [];
-  for (const slider of section.querySelectorAll("input[type=range]")) {
-    const output = slider.parentElement.querySelector("output"), before = output.textContent;
-    const canvas = section.querySelector("canvas"), picture = canvas.toDataURL();
-    slider.value = +slider.value === +slider.max ? 0 : slider.max;
-    slider.dispatchEvent(new Event("input", { bubbles: true }));
-    const same = output.textContent === before || canvas.toDataURL() === picture;
-    // the belt is untwisted only after a turn by 720°
-    if (same && slider.ariaLabel !== "untwist (0 to 1)") found.push(slider.ariaLabel);
-  }
-  return found;
-}"""
-
-
-@pytest.mark.parametrize("path", quick_for(["06"], LESSONS))
-def test_every_slider_of_a_deck_works(context, path):
-    with watched(context) as page:
-        opened(page, of(path))
-        count = page.evaluate("sections.length")
-        for number in range(count):
-            if not page.evaluate(f"sections[{number}].querySelector('figure > script[type]')"):
-                continue
-            page.evaluate(f"Reveal.slide(...Object.values(Reveal.getIndices(sections[{number}])))")
-            page.wait_for_function(f"sections[{number}].querySelector('figure canvas')")
-            assert page.evaluate(DEAD) == [], (path.stem, number + 1)
-
-
-def test_decks_are_small_enough_for_mail():
-    decks = [path for path in SLIDES.glob("*.html") if not path.stem.endswith("_crib")]
+def test_decks_are_small_enough_for_mail(book):
+    slides = book / "slides"
+    decks = [path for path in slides.glob("*.html") if not path.stem.endswith("_crib")]
     assert {path.stem for path in decks} == {path.stem for path in LESSONS}
     assert max(path.stat().st_size for path in decks) < 1.2e6
-    shared = [*(SLIDES / "shared").iterdir(), SLIDES.parent / "_static" / "tex-svg.js"]
+    shared = [*(slides / "shared").iterdir(), book / "_static" / "tex-svg.js"]
     assert sum(path.stat().st_size for path in shared) < 2.6e6
 
 
 @pytest.fixture
-def deck(page):
+def deck(page, of):
     """Return the slides of lesson 06."""
     page.set_viewport_size({"width": 1280, "height": 720})
     return opened(page, of(LESSONS[6]))
@@ -144,7 +129,7 @@ def until(page, selector, key="PageDown"):
     raise AssertionError(f"no slide {selector}")
 
 
-def test_a_remote_control_goes_through_all_steps(deck):
+def test_a_remote_control_goes_through_all_steps(deck, of):
     seen, steps = [], 0
     until(deck, ":has(.panel input)")
     slider = deck.locator(f"{SLIDE} .panel input").first
@@ -177,35 +162,34 @@ def test_a_remote_control_goes_through_all_steps(deck):
     assert "Recap" in deck.evaluate(HERE)
 
 
-def test_the_dark_scheme_is_never_automatic(context):
-    with watched(context) as page:
-        page.emulate_media(color_scheme="dark")
-        opened(page, of(LESSONS[6]))
-        colour = "getComputedStyle(document.body).backgroundColor"
-        assert page.evaluate(colour) == "rgb(255, 255, 255)"
-        page.keyboard.press("d")
-        assert page.evaluate(colour) == "rgb(22, 24, 28)"
-        page.keyboard.press("d")
-        expect(page.locator("html")).not_to_have_class(re.compile("dark"))
-        page.keyboard.press("?")
-        keys = "Open or close a vote", "Dark or light", "After the end", "Readouts", "overview"
-        for words in keys:
-            expect(page.locator(".r-overlay-help")).to_contain_text(words)
-        page.keyboard.press("Escape")
-        until(page, ":has(.panel input)")
-        table = page.locator(f"{SLIDE} .panel table")
-        expect(table).to_be_hidden()
-        page.keyboard.press("r")
-        expect(table).to_be_visible()
-        page.keyboard.press("r")
-        time = page.locator(f"{SLIDE} .panel input").last
-        before = time.input_value()
-        page.keyboard.press("m")
-        expect(time).not_to_have_value(before)
-        page.keyboard.press("m")
-        until(page, ".verdict")
-        until(page, ":has(.panel input)", "PageUp")
-        expect(table).to_be_visible()  # the vote is over, so the table is shown
+def test_the_dark_scheme_is_never_automatic(page, of):
+    page.emulate_media(color_scheme="dark")
+    opened(page, of(LESSONS[6]))
+    colour = "getComputedStyle(document.body).backgroundColor"
+    assert page.evaluate(colour) == "rgb(255, 255, 255)"
+    page.keyboard.press("d")
+    assert page.evaluate(colour) == "rgb(22, 24, 28)"
+    page.keyboard.press("d")
+    expect(page.locator("html")).not_to_have_class(re.compile("dark"))
+    page.keyboard.press("?")
+    keys = "Open or close a vote", "Dark or light", "After the end", "Readouts", "overview"
+    for words in keys:
+        expect(page.locator(".r-overlay-help")).to_contain_text(words)
+    page.keyboard.press("Escape")
+    until(page, ":has(.panel input)")
+    table = page.locator(f"{SLIDE} .panel table")
+    expect(table).to_be_hidden()
+    page.keyboard.press("r")
+    expect(table).to_be_visible()
+    page.keyboard.press("r")
+    time = page.locator(f"{SLIDE} .panel input").last
+    before = time.input_value()
+    page.keyboard.press("m")
+    expect(time).not_to_have_value(before)
+    page.keyboard.press("m")
+    until(page, ".verdict")
+    until(page, ":has(.panel input)", "PageUp")
+    expect(table).to_be_visible()  # the vote is over, so the table is shown
 
 
 def speaker_view(page, context):
@@ -276,7 +260,7 @@ def test_the_speaker_view_shows_the_run_sheet_and_the_answers(deck, context):
     speaker.close()
 
 
-def test_each_printed_title_is_above_its_text(page):
+def test_each_printed_title_is_above_its_text(page, of):
     opened(page, of(LESSONS[6]) + "?print-pdf")
     page.locator(".pdf-page section h2").last.wait_for(state="attached")
     pairs = page.evaluate(
