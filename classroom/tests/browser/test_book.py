@@ -197,7 +197,7 @@ def test_columns_of_a_figure_stand_one_below_another_on_a_phone(book, page):
     assert max(box["width"] for box in boxes) == figure.bounding_box()["width"]
     for upper, lower in pairwise(boxes):
         assert lower["y"] >= upper["y"] + upper["height"] - 1
-    path = BOOK / "lessons" / image.get_attribute("src")
+    path = book / "lessons" / image.get_attribute("src")
     whole = pixels(path.read_bytes())
     ends = np.round(np.array([0, *cuts, 1]) * whole.shape[1]).astype(int)
     for column, (left, right) in zip(columns, pairwise(ends), strict=True):
