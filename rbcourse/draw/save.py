@@ -198,9 +198,9 @@ def write_figure(
     if folder:
         files = {"csv": table.encode(), **pictures}
         if pdf:
-            content = io.BytesIO()
-            fig.savefig(content, format="pdf", metadata={"CreationDate": None})
-            files["pdf"] = content.getvalue()
+            stream = io.BytesIO()
+            fig.savefig(stream, format="pdf", metadata={"CreationDate": None})
+            files["pdf"] = stream.getvalue()
         for ending, content in files.items():
             replace_file(folder / f"{name}.{ending}", content)
 
