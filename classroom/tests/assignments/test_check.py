@@ -51,6 +51,7 @@ def test_check_writes_the_file_to_submit_without_nbgrader(hand_in):
     path = hand_in(change, half=half)
     (path.parent / "mine.csv").write_text("1", encoding="utf-8")
     before = path.read_bytes()
+    os.utime(path, (3.156e8, 3.156e8))  # the date of files in a handout, 1980-01-01
     done = subprocess.run(
         [sys.executable, "-c", run, "ps0.ipynb"],
         cwd=path.parent,
@@ -59,6 +60,7 @@ def test_check_writes_the_file_to_submit_without_nbgrader(hand_in):
         env={**os.environ, "PYTHONIOENCODING": "ascii"},
     )
     assert (done.returncode, done.stderr) == (0, ""), done
+    assert done.stdout.startswith("checking ps0.ipynb\n")
     assert "running cell 9 of 9" in done.stdout
     tests, last = done.stdout.splitlines()[-2:]
     assert tests == "2 of 2 visible tests passed; hidden tests run in grading"
