@@ -132,7 +132,7 @@ def _look_into(zipped: ZipFile, file: File, room: list[int], depth: int) -> Iter
 
 
 def find_owners(files: list[File]) -> None:
-    """Store what is known about the student of each file in `about`."""
+    """Store the number, the name and the dates of the student of each file in `about`."""
     beside = defaultdict[tuple[str, ...], set[str]](set)  # the parts below each path
     for file in files:
         for at in range(len(file.parts) * (not file.kind)):
