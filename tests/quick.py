@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+NOTEBOOKS = Path(__file__).parents[1] / "notebooks"
+
 
 def quick_for(names, values):
     """Return values, or paths, as parameters of a test. Names of lessons have two digits. All are
@@ -14,3 +16,8 @@ def quick_for(names, values):
         marks = [] if name in names else pytest.mark.slow
         params.append(pytest.param(value, id=name, marks=marks))
     return params
+
+
+def stored_notebooks():
+    """Return the lessons and the problem sets, without the work of students and lecturers."""
+    return sorted([*NOTEBOOKS.glob("*.ipynb"), *NOTEBOOKS.glob("assignments/source/*/*.ipynb")])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from quick import stored_notebooks
 
 import rbcourse as rb
 
@@ -203,7 +204,7 @@ def test_the_package_exports_few_names():
 def lines_for_users():
     """Yield the README, and the text and the code of all lessons and problem sets."""
     yield (ROOT / "README.md").read_text("utf-8")
-    for path in sorted((ROOT / "notebooks").rglob("*.ipynb")):
+    for path in stored_notebooks():
         cells = json.loads(path.read_text("utf-8"))["cells"]
         yield from ("".join(cell["source"]) for cell in cells)
 

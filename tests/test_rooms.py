@@ -13,6 +13,7 @@ from textwrap import dedent
 from typing import is_typeddict
 
 import pytest
+from quick import stored_notebooks
 
 import rbclassroom
 import rbcourse
@@ -164,7 +165,7 @@ def clients():
     folders = PACKAGES["rbcourse"] / "draw", PACKAGES["rbclassroom"], ROOT / "benchmarks"
     for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
         yield path.relative_to(ROOT).as_posix(), path.read_text("utf-8")
-    for path in sorted((ROOT / "notebooks").rglob("*.ipynb")):
+    for path in stored_notebooks():
         cells = json.loads(path.read_text("utf-8"))["cells"]
         code = ("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
         yield path.relative_to(ROOT).as_posix(), "\n".join(code)

@@ -78,6 +78,17 @@ def test_the_acceleration_of_a_spline_is_continuous(name, degrees, ends):
 
 
 @pytest.mark.source("beyond BK 13")
+def test_a_wide_leg_of_a_projected_spline_is_reported():
+    """From rest to rest, a leg of 120° costs 2.6 times as much as the optimum."""
+    turns = rb.exp_so3(np.radians([[0, 0, 0], [0, 0, 119], [0, 0, 240]]))
+    rb.projected_spline([0, 1], turns[:2])
+    with pytest.warns(RuntimeWarning, match=r"poses\[1\] and poses\[2\]: .* 121°") as warned:
+        rb.projected_spline([0, 1, 2], turns)
+    assert warned[0].filename == __file__
+    ratio = rb.acceleration_cost(rb.projected_cubic(np.eye(3), rb.exp_so3([0, 0, 2 * np.pi / 3])))
+    assert ratio / (24 * (2 * np.pi / 3) ** 2) == pytest.approx(2.57, abs=0.01)
+
+
 def test_velocities_of_projected_splines_agree_with_the_textbook():
     t, R = path(9, 100, 2)
     assert off(rb.spline_velocities(t, R) - textbook.spline_velocities(t, R), 1) < 100 * EPS

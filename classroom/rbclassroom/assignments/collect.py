@@ -11,6 +11,7 @@ import re
 import unicodedata
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,8 @@ from rbclassroom.assignments.downloads import File, find_files, find_owners, wri
 from rbclassroom.assignments.submissions import count_found, read_notebook
 from rbcourse.files import replace_file
 
-LISTS = ["collected", "unchanged", "late", "duplicates", "unmatched", "refused", "ignored"]
-LISTS += ["nothing usable", "not on the roster", "missing"]
+LISTS = ["collected", "unchanged", "renamed", "late", "duplicates", "unmatched", "refused"]
+LISTS += ["ignored", "nothing usable", "not on the roster", "missing"]
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
 Group = tuple[str, str, str]  # a set, a student, and the student's number or folder in the LMS
 Owner = tuple[str, str]  # the number and the name of a student in the LMS
@@ -43,12 +44,15 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     ids = {row["id"] for row in roster}
     groups, rows, labels = _grouped(folder, sets, roster)
     rows += _namesakes(groups, submitted)
+    for who in ids & {*labels}:  # also students without a usable file in this download
+        for name in sets:
+            rows += _renamed(f"{who}/{name}", labels[who], owners, assignments)
     for group, uploads in groups.items():
         name, *_, number = group
         *others, best = uploads
         owner = best.about["id"], best.about["name"]
         who = _folder_of(group, [*groups], owner, owners, ids)
-        rows += _renamed(f"{who}/{name}", owner, owners, submitted)
+        rows += _renamed(f"{who}/{name}", owner, owners, assignments)
         owners[f"{who}/{name}"] = owner
         labels[who] = owner
         rows += [("duplicates", other.label, f"{best.label} is used instead") for other in others]
@@ -168,19 +172,42 @@ def _folder_of(
     return f"{student}_{_plain(number) if are_apart else same.index(number) + 1}"
 
 
-def _renamed(key: str, owner: Owner, owners: dict[str, Owner], submitted: Path) -> Iterator[Row]:
-    """Move files that were collected before the student was on the roster to ``student/set``."""
+def _renamed(key: str, owner: Owner, owners: dict[str, Owner], assignments: Path) -> Iterator[Row]:
+    """Move work that was collected before the student was on the roster to ``student/set``.
+
+    The points and comments of graded work, and its feedback, move, too.
+    """
     who, _, name = key.rpartition("/")
     same = [old for old, known in owners.items() if owner[0] and known == owner and old != key]
     for old in (old for old in same if old.endswith(f"/{name}")):
         del owners[old]
+        submitted = assignments / "submitted"
         if (submitted / key).exists() or not (submitted / old).exists():
             why = f"the same student as {who}, {name}; delete this folder if it is there"
             yield "duplicates", f"submitted/{old}", why
             continue
-        (submitted / who).mkdir(exist_ok=True)
-        (submitted / old).rename(submitted / key)
+        _rename_in_gradebook(old, key, assignments / "gradebook.db")
+        for folder in ("autograded", "feedback", "submitted"):
+            if (assignments / folder / old).exists():
+                (assignments / folder / who).mkdir(exist_ok=True)
+                (assignments / folder / old).rename(assignments / folder / key)
+                with suppress(OSError):  # it has other sets
+                    (assignments / folder / old).parent.rmdir()
+        owners[key] = owner
         yield "renamed", f"submitted/{old}", f"is {who}, {name}"
+
+
+def _rename_in_gradebook(old: str, new: str, path: Path) -> None:
+    """Give the points and comments of a ``student/set`` to another student."""
+    if not path.exists():
+        return
+    from nbgrader.api import Gradebook, MissingEntry  # this import takes a second
+
+    (before, _, name), (after, _, _) = old.rpartition("/"), new.rpartition("/")
+    with Gradebook(f"sqlite:///{path.resolve()}") as gradebook, suppress(MissingEntry):
+        submission = gradebook.find_submission(name, before)
+        submission.student = gradebook.update_or_create_student(after)
+        gradebook.db.commit()
 
 
 def _why_late(about: dict[str, str], due: datetime | None) -> str:

@@ -23,6 +23,8 @@ IN_RADIANS = (
     "Angles are in radians here, and NumPy's functions take and return radians: convert nothing."
 )
 EMPTY = "Your function stops at raise NotImplementedError(). Write your answer in place of it."
+NO_INPUT = "StdinNotImplementedError"  # the error of ipykernel, with a long traceback
+WHY_NO_INPUT = "input() has no answer here; write the value into the code"
 _rows = np.atleast_1d
 GENERAL: dict[str, Callable[[Array, Array], list[Array]]] = {
     "Your result is transposed.": lambda right, got: [right.T],
@@ -67,6 +69,8 @@ def call_student(function: Any, arguments: tuple[Any, ...], times: int = 1) -> l
     except NotImplementedError as error:
         *_, (frame, _) = traceback.walk_tb(error.__traceback__)
         name = frame.f_code.co_name
+        if type(error).__name__ == NO_INPUT:
+            raise NotYet(f"Your function stops: {WHY_NO_INPUT}") from None
         if name != getattr(function, "__name__", name):
             why = f"Your function calls {name}, where nothing is written yet."
             raise NotYet(why) from None

@@ -11,6 +11,7 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from traitlets import Integer
 
+from rbclassroom.assignments.marking import NO_INPUT, WHY_NO_INPUT
 from rbclassroom.course.notebooks import kernel_address
 
 CELL_SECONDS = 30  # the time limit for a cell, in the check and in grading
@@ -18,9 +19,7 @@ ROOM = {"stream": 100_000, "data": 2_000_000}  # limits for a cell's outputs, in
 ALL_OUTPUT = 10_000_000  # characters, for a notebook
 DISPLAYS = ("display_data", "execute_result", "update_display_data")
 CUT = "the output is too large, and the rest is left out"
-NO_INPUT = "StdinNotImplementedError"  # the error of ipykernel, with a long traceback
-_WHY = "input() has no answer here; write the value into the code"
-ASKED = {"ename": "EOFError", "evalue": _WHY, "traceback": [_WHY]}
+ASKED = {"ename": "EOFError", "evalue": WHY_NO_INPUT, "traceback": [WHY_NO_INPUT]}
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
 

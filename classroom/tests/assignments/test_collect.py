@@ -13,12 +13,15 @@ from datetime import datetime
 import nbformat
 import pytest
 from nbformat.v4 import new_markdown_cell, new_notebook
+from nbgrader.api import Gradebook
 from nbgrader.utils import parse_utc
 from tiny import MODULE
 from tiny_set import write_tiny_set
+from traitlets.config import Config
 
 from rbclassroom.assignments import downloads
 from rbclassroom.assignments.__main__ import main
+from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.collect import collect, read_owners, read_report
 from rbclassroom.assignments.submissions import read_notebook
 
@@ -523,6 +526,31 @@ def test_a_roster_that_comes_later_renames_the_folder(course):
         ("s3", "all.zip: Paul_7_assignsubmission_file/a.pdf: it is neither a notebook nor a zip")
     ]
     assert of("renamed", collected(course, {})) == []
+
+
+@pytest.mark.filterwarnings("ignore:Object of type <SubmittedAssignment>")  # nbgrader's own
+def test_points_and_feedback_are_kept_when_a_roster_renames_the_folder(course):
+    configure(Config())  # nbgrader finds alembic, which makes the gradebook
+    files_of_moodle = {moodle("Ada Lovelace_1001"): answered(course)}
+    collected(course, files_of_moodle)
+    for folder in ("autograded", "feedback"):
+        (course / folder / "ada_lovelace" / "ps1").mkdir(parents=True)
+    database = f"sqlite:///{course / 'gradebook.db'}"
+    with Gradebook(database) as gradebook:
+        gradebook.add_assignment("ps1")
+        gradebook.add_student("ada_lovelace")
+        graded = gradebook.add_submission("ps1", "ada_lovelace").id
+    (course / "students.csv").write_text("id,first_name,last_name\ns1,Ada,Lovelace\n", "utf-8")
+    (course.parents[1] / "downloads" / moodle("Ada Lovelace_1001")).unlink()
+    rows = collected(course, {moodle("Ada Lovelace_1001", "a.pdf"): b"%PDF-1.7"})
+    assert of("renamed", rows) == [("submitted/ada_lovelace/ps1", "is s1, ps1")]
+    assert of("missing", rows) == []
+    with Gradebook(database) as gradebook:
+        assert gradebook.find_submission("ps1", "s1").id == graded
+        assert [each.student.id for each in gradebook.assignment_submissions("ps1")] == ["s1"]
+    for folder in ("autograded", "feedback", "submitted"):
+        assert (course / folder / "s1" / "ps1").is_dir()
+        assert not (course / folder / "ada_lovelace").exists()
 
 
 def test_facts_about_a_set_survive_the_collection_of_another(course):

@@ -28,6 +28,16 @@ def test_errors_in_a_function_are_reported():
         call_student(1.5, (1,))
 
 
+def test_a_function_that_asks_for_input_is_told_so():
+    source = """
+        from IPython.core.error import StdinNotImplementedError
+        def raw_input(): raise StdinNotImplementedError("no frontend")
+        def answer(x): return raw_input()
+        """
+    with pytest.raises(NotYet, match=r"^Your function stops: input\(\) has no answer here"):
+        call_student(student(source), (1,))
+
+
 def test_an_answer_that_calls_an_empty_answer_is_told_so():
     source = "def half(x):\n    raise NotImplementedError()\ndef answer(x): return half(x)"
     with pytest.raises(NotYet, match="calls half, where nothing is written yet"):
