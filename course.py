@@ -75,6 +75,8 @@ def main():
         sys.exit(2)
     environment, commands, purpose = TASKS[task]
     runpy.run_path(str(OPTIONS))["parse"](task, words, purpose)  # --help ends here
+    if task in ("grade", "handout"):
+        check_sets([word for word in words if not word.startswith("-")])
     if task in PATHS and Path.cwd() != ROOT:
         words = [from_here(word) for word in words]
     set_up(environment)
@@ -85,6 +87,15 @@ def main():
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     for command in commands:
         run(*command.split(), *(words if command is commands[-1] else []))
+
+
+def check_sets(names):
+    """Exit if there is no problem set of one of these names, before packages are installed."""
+    places = (ROOT / "notebooks" / "assignments").glob("*/*/*.ipynb")
+    known = sorted({path.stem for path in places if path.parts[-3] in ("source", "private")})
+    for name in names:
+        if known and name not in known:
+            sys.exit("%s: one of %s is wanted" % (name, ", ".join(known)))
 
 
 def from_here(word):

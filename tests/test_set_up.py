@@ -160,6 +160,18 @@ def test_pip_installs_the_packages_if_uv_fails(done, monkeypatch):
     assert by_uv[-2:] == by_pip[-2:] == ["-r", "environment.txt"]
 
 
+@pytest.mark.parametrize("task", ["handout", "grade"])
+def test_an_unknown_problem_set_is_named_before_packages_are_installed(
+    task, done, tmp_path, monkeypatch
+):
+    (tmp_path / "notebooks/assignments/source/ps1").mkdir(parents=True)
+    (tmp_path / "notebooks/assignments/source/ps1/ps1.ipynb").touch()
+    monkeypatch.setattr(sys, "argv", ["course.py", task, "ps9"])
+    with pytest.raises(SystemExit, match=r"^ps9: one of ps1 is wanted$"):
+        course.main()
+    assert done == []
+
+
 @pytest.mark.parametrize("task", course.TASKS)
 def test_each_task_passes_its_arguments_to_its_modules(task, done, tmp_path, monkeypatch):
     """Relative paths start at the folder in which the command is typed."""

@@ -46,6 +46,7 @@ def main() -> None:
     except (OSError, ValueError, CellExecutionError) as error:
         sys.exit(str(error))
     except KeyboardInterrupt:
+        print("Stopped.", file=sys.stderr)
         sys.exit(130)
 
 

@@ -74,7 +74,7 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
     except KeyboardInterrupt:
         count = f"{len({*rows, *progress.results})} of {len(jobs)} submissions are graded"
         print(f"Stopped: {count}. Run this again to continue; then the tables are written.")
-        raise
+        raise SystemExit(130) from None
     return tables
 
 

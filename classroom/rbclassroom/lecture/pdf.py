@@ -10,6 +10,10 @@ from rbcourse.files import replace_file
 
 BROWSERS = ["chromium-headless-shell", "chromium", "chromium-browser"]
 BROWSERS += ["google-chrome", "chrome", "msedge"]
+BROWSERS += ["/Applications/Google Chrome.app/Contents/MacOS/Google Chrome"]
+BROWSERS += ["/Applications/Microsoft Edge.app/Contents/MacOS/Microsoft Edge"]
+BROWSERS += [r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe"]
+BROWSERS += [r"C:\Program Files\Google\Chrome\Application\chrome.exe"]
 """Programs that print a page as PDF; the first has no window, and is the fastest."""
 
 
@@ -18,8 +22,8 @@ def print_pdf(address: str, pdf: Path) -> None:
     named = os.environ.get("BROWSER", "")
     found = next(filter(None, map(shutil.which, (named, *BROWSERS))), None)
     if not found:
-        names = ", ".join(BROWSERS)
-        raise ValueError(f"To print, install one of {names}, or set BROWSER to a browser's name.")
+        names = "Chromium, Google Chrome or Microsoft Edge"
+        raise ValueError(f"To print, install {names}, or set BROWSER to the path of one of them.")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         made = Path(profile, "slides.pdf")
         words = ["--headless", "--disable-gpu", "--no-first-run", "--no-pdf-header-footer"]
