@@ -213,6 +213,9 @@ def test_a_curve_outside_the_domain_is_announced():
     exact, _ = wandering(T, 0.3)
     with pytest.warns(RuntimeWarning, match="finds nothing to smooth, so the noise is not known"):
         rb.smoothing_spline(T, exact)
+    origins = np.random.default_rng(0).normal(size=(len(T), 3))
+    with pytest.warns(RuntimeWarning, match=r"^rotations: cross validation finds nothing"):
+        rb.smoothing_spline(T, rb.pose_from_components(exact, origins))
     with pytest.warns(RuntimeWarning, match="nothing is smoothed; some poses are wrong, or noise"):
         rb.smoothing_spline(T, NOISY, noise=1e-9)
 

@@ -417,8 +417,10 @@ class Smoother:
 
     def check_noise(self, periods: Any, noise: ArrayLike | None) -> None:
         """Warn if the best of the tried periods is the least one."""
-        if np.min(periods) < self.period(np.exp(LEAST + STEP)):
+        least = np.atleast_1d(periods) < self.period(np.exp(LEAST + STEP))
+        if least.any():
+            part = ("rotations: ", "origins: ")[np.argmax(least)] if least.size == 2 else ""
             why = "cross validation finds nothing to smooth, so the noise is not known; give noise"
             if noise is not None:
                 why = "nothing is smoothed; some poses are wrong, or noise is too small; change it"
-            warnings.warn(f"{why} or period", RuntimeWarning, stacklevel=3)
+            warnings.warn(f"{part}{why} or period", RuntimeWarning, stacklevel=3)
