@@ -47,8 +47,10 @@ def watched(context):
     meant = "is an original, and is not saved"
     page.on("pageerror", lambda error: meant in str(error) or faults.append(f"error {error}"))
     # JupyterLab gets status 403 when it tries to save an original. If a kernel has ended, widgets
-    # report that they cannot send it their values.
-    known = re.compile("^(?!error)|403|Could not send widget sync message")
+    # report that they cannot send it their values, and JupyterLab that it cannot ask its debugger.
+    known = re.compile(
+        "^(?!error)|403|Could not send widget sync message|Could not restore the debugger state"
+    )
     page.on("console", lambda m: known.search(f"{m.type} {m.text}") or faults.append(m.text))
     yield page
     page.close()
