@@ -44,7 +44,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     ids = {row["id"] for row in roster}
     groups, rows, labels = _grouped(folder, sets, roster)
     rows += _namesakes(groups, submitted)
-    for who in ids & {*labels}:  # also students without a usable file in this download
+    for who in sorted(ids & {*labels}):  # also students without a usable file in this download
         for name in sets:
             rows += _renamed(f"{who}/{name}", labels[who], owners, assignments)
     for group, uploads in groups.items():
