@@ -185,6 +185,21 @@ def test_single_problems_without_convergence_raise_an_error():
         assert np.abs(broken(TIMES, order)[:, 0] - motion(TIMES, order)).max() < 1e-10
 
 
+@pytest.mark.parametrize("make", [rb.minimum_acceleration, rb.minimum_torque])
+def test_the_work_for_rods_without_convergence_is_bounded(monkeypatch, make):
+    """Each curve from which Newton's method fails takes half a second."""
+    real, numbers = Search.follow, []
+
+    def counted(search, curves):
+        numbers.append(len(curves))
+        assert sum(numbers) <= 40
+        real(search, curves)
+
+    monkeypatch.setattr(Search, "follow", counted)
+    with pytest.raises(rb.optimum.ConvergenceError, match=r"the principal moments too different"):
+        make(I3, rb.exp_so3([0.4, 0.9, -0.3]), REST, I3[1], body=rb.Body(np.diag([1e-6, 1, 1])))
+
+
 def test_the_search_warns_if_newtons_method_fails_from_the_cheapest_start(monkeypatch):
     """For the first of three problems, the test lets Newton's method converge only to curves that
     turn the other way."""

@@ -81,6 +81,8 @@ class Thresholds:
     refined = 3.0  # curves up to this cost ratio are lowered on more nodes [1.5: 0]
     spun = 3.0, 1.15  # spin is added twice, to curves up to these cost ratios [once: 2]
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost [1: 1]
+    needle = 300.0  # beyond this ratio of moments, the work is bounded [36 rods: at most 3 s each]
+    most_of_needles = 16  # promising curves of a needle [100: over 40 s for a third of them]
     most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
     promising = 1.3  # curves above this cost ratio are dropped before more steps [1.1: 1]
     starts = Steps(40, 5e-4)  # Gauss–Newton steps for starting curves [20 or 5e-3: 0]
@@ -129,6 +131,7 @@ class Search:
                 self.found[i] = one
         unknown = [one is NOTHING for one in self.found]
         self.unknown = np.flatnonzero(unknown)
+        self.most = np.full(self.count, LIMITS.most)
 
     def run(self) -> Results:
         """Search for the solutions that are not known, and return all solutions."""
@@ -162,10 +165,7 @@ class Search:
         some = np.isin(curves.problem, problems)
         lower = lowered(self.functional, curves.take(some), LIMITS.last)
         self.follow(lower)
-        for i in self.too_costly(problems, curves):
-            one = self.found[i]
-            if isinstance(one, Solution):
-                self.found[i] = one._replace(beaten=True)
+        self.mark_beaten(self.too_costly(problems, curves))
 
     def cheap_curves(self, problems: Numbers, n: int, known: Curves) -> Curves:
         """Return curves of low cost on n nodes, from the starts and from known curves."""
@@ -179,7 +179,7 @@ class Search:
     def promising(self, curves: Curves, ratio: float) -> Mask:
         """Tell which curves have a cost up to this ratio, and are not close to a cheaper curve.
 
-        For each problem, these are at most `LIMITS.most` curves, the cheapest ones.
+        For each problem, these are at most `self.most` curves, the cheapest ones.
         """
         least = curves.least(self.count)
         costly = curves.cost > ratio * least[curves.problem]
@@ -188,7 +188,7 @@ class Search:
         problem = curves.problem[order]
         rank = np.arange(len(order)) - np.searchsorted(problem, problem)
         kept = np.zeros(len(curves), bool)
-        kept[order[rank < LIMITS.most]] = True
+        kept[order[rank < self.most[problem]]] = True
         return kept
 
     def follow(self, curves: Curves) -> None:
@@ -208,6 +208,12 @@ class Search:
         bound = LIMITS.known_cost * curves.least(self.count)
         failed = self.costs() > bound
         return problems[failed[problems]]
+
+    def mark_beaten(self, problems: Numbers) -> None:
+        for i in problems:
+            one = self.found[i]
+            if isinstance(one, Solution):
+                self.found[i] = one._replace(beaten=True)
 
     def costs(self) -> Array:
         return np.array([one.cost for one in self.found])
@@ -233,6 +239,12 @@ class BodySearch(Search):
     first_steps = LIMITS.starts_of_bodies
     followed = LIMITS.followed_of_bodies
 
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        moments = np.linalg.eigvalsh(self.functional.G)
+        self.is_needle = moments[:, 2] > LIMITS.needle * moments[:, 0]
+        self.most[self.is_needle] = LIMITS.most_of_needles
+
     def run(self) -> Results:
         super().run()
         self.leave_the_axis()
@@ -253,6 +265,13 @@ class BodySearch(Search):
         curves = curves.with_ends(self.ends)
         curves = lowered(self.functional, curves, LIMITS.on_more_nodes)
         return self.with_spin(curves, worth)
+
+    def too_costly(self, problems: Numbers, curves: Curves) -> Numbers:
+        """Return the problems that are searched again: needles are not, if there are many nodes."""
+        failed = super().too_costly(problems, curves)
+        ends_here = self.is_needle[failed] & (curves.nodes > LIMITS.more_nodes[0])
+        self.mark_beaten(failed[ends_here])
+        return failed[~ends_here]
 
     def worth_a_turn(self, curves: Curves) -> Mask:
         """Tell for each problem and principal axis, shape (…, 3), whether spin may lower the cost.
