@@ -209,3 +209,11 @@ def test_a_stack_with_a_jump_needs_little_memory():
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 100e6
+
+
+@pytest.mark.parametrize(("degrees", "ratio"), [(120, 2.6), (150, 14), (170, 300)])
+def test_the_documented_costs_near_half_turns(degrees, ratio):
+    """From rest to rest, the optimum costs 24 ‖σ‖²."""
+    curve = rb.projected_cubic(np.eye(3), rb.exp_so3([0, 0, np.radians(degrees)]))
+    assert rb.acceleration_cost(curve) == pytest.approx(24 * np.radians(degrees) ** 2 * ratio, 0.02)
+    assert f"{ratio} times" in rb.projected_cubic.__doc__

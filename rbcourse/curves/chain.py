@@ -82,7 +82,9 @@ def chain(
     -----
     A chain of cubic legs is C¹: the acceleration jumps, unless the velocities belong to a spline of
     these legs. A chain of quintic legs is C². Singular set: that of the legs. Half-turns between
-    successive poses raise ValueError. For a larger turn, insert a pose.
+    successive poses raise ValueError. For a larger turn, insert a pose. Legs of `projected_cubic`
+    have a high peak of acceleration near a half-turn, without a warning: from rest to rest, one
+    costs 14 times as much as the optimum at 150°, and 300 times at 170°.
 
     Examples
     --------

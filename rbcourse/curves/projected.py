@@ -158,8 +158,10 @@ def projected_cubic(
     The curve does not depend on the choice of frames: the ends L R0 Q, L R1 Q, Qᵀ w0, Qᵀ w1 give
     the curve L R(t) Q (and the inertia Qᵀ G Q). The optimum is `minimum_acceleration`. If the
     excursion is multiplied by s, the relative excess over this optimum is multiplied by about s⁴.
-    For large excursions, the excess may be large. `rbcourse.textbook.projected_cubic` is a short
-    version for a single curve.
+    Near a half-turn, the acceleration has a high peak: from rest to rest, the curve costs 2.6 times
+    as much as the optimum for a turn by 120°, 14 times for 150°, and 300 times for 170°. No warning
+    is given. `closed_forms.corrected_bezier` has no such peak. `rbcourse.textbook.projected_cubic`
+    is a short version for a single curve.
 
     Examples
     --------
