@@ -206,10 +206,26 @@ def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
     assert np.sqrt(np.mean(rb.angle_between(c(t)[:, :3, :3], true[:, :3, :3]) ** 2)) < 0.004
 
 
+@pytest.mark.parametrize("smooth", METHODS)
+def test_a_gap_is_announced(smooth):
+    """A gap of two periods; every tenth time, and random times without a gap, are no gaps."""
+    t = np.linspace(0, 8, 200)
+    _, poses = wandering(t, 0.3)
+    known = np.abs(t - 4) > 1
+    with pytest.warns(RuntimeWarning, match=r"no pose between 2\.97\S* and 5\.02\S*, .* period 1,"):
+        smooth(t[known], poses[known], period=1)
+    smooth(t[known], poses[known], period=2.2)
+    smooth(t[::10], poses[::10], period=0.3)
+    uneven = np.sort(np.random.default_rng(4).choice(200, 100, replace=False))
+    smooth(t[uneven], poses[uneven], period=1)
+
+
 def test_a_curve_outside_the_domain_is_announced():
     steady = rb.exp_so3(T[:, None] * [0, 0, 2])
     with pytest.warns(RuntimeWarning, match=r"the body turns by 2 rad in the time period/2π"):
         rb.smoothing_spline(T, steady, period=10)
+    with pytest.warns(RuntimeWarning, match=r"turns by 1\.01 rad .* up to 1 rad;"):
+        rb.smoothing_spline(T, rb.exp_so3(T[:, None] * [0, 0, 0.2]), period=10.05 * np.pi)
     exact, _ = wandering(T, 0.3)
     with pytest.warns(RuntimeWarning, match="finds nothing to smooth, so the noise is not known"):
         rb.smoothing_spline(T, exact)

@@ -124,6 +124,7 @@ def minimum_acceleration_smoothing(
     if A.shape[-1] == 4:
         c = with_origins(c, OptimalMotion, smoother, A[:, :3, 3], noises[1], periods[1])
         c = replace(c, cost=c.cost + c.body.mass * float(np.sum(c.legs.moving_cost)))
+    smoother.check_gaps(c.period)
     if period is None:
         smoother.check_noise(c.period, noise)
     return c
