@@ -356,6 +356,10 @@ def test_a_long_calculation_shows_its_progress(capsys, monkeypatch):
     monkeypatch.setattr(_cells.reported.__globals__["time"], "monotonic", lambda: next(clock))
     list(_cells.reported("work", range(3)))
     assert capsys.readouterr().err == "work: 33%\nwork: 67%\n"
+    monkeypatch.setattr(_cells, "reported", lambda work, parts: print(work) or parts)
+    rb.fastest(rb.geodesic(np.eye(3), rb.exp_so3([0, 0, 1])), angular_acceleration=1)
+    wanted = [f"fastest, grid 1 of at most 4, pass {i} of 2" for i in (1, 2)]
+    assert capsys.readouterr().out.splitlines()[:2] == wanted
 
 
 def test_a_short_peak_of_a_limit_is_found():

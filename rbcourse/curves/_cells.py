@@ -178,7 +178,8 @@ def fastest_motion(curve: Curve, limits: list[Limit], ends: Array) -> Triple:
     counts = path.cell_counts()
     for left in range(REFINEMENTS, -1, -1):
         cells = Cells(path, counts, limits)
-        x, y = _forward(cells, *_backward(cells))
+        of = f"fastest, grid {REFINEMENTS + 1 - left} of at most {REFINEMENTS + 1}, pass"
+        x, y = _forward(cells, *_backward(cells, of), of)
         shares = cells.largest_shares(x, y)
         over = shares > 1 + TOLERANCE
         if left == 0 or not over.any():
@@ -429,7 +430,7 @@ def _graded(even: Array, fine: Flags) -> Array:
     return np.select([start & end, start, end], [both, from_start, to_end], even)
 
 
-def _backward(cells: Cells) -> tuple[Array, Array]:
+def _backward(cells: Cells, of: str) -> tuple[Array, Array]:
     """Return the least and the largest x of each cell from which the end can be reached.
 
     The least x exceeds 0 if the motion is still fast at the end of the path.
@@ -438,7 +439,7 @@ def _backward(cells: Cells) -> tuple[Array, Array]:
     ends = cells.ends
     low, high = np.empty((2, len(cells.s)))
     least, most = 0.0, 0.0
-    for part in reported("fastest, first pass", cells.parts[::-1]):
+    for part in reported(f"{of} 1 of 2", cells.parts[::-1]):
         Q = cells.ellipses(part.start, part.stop)
         # these are lists, because Python is faster than NumPy for single cells
         ellipses = Q.transpose(1, 2, 0).tolist()
@@ -462,12 +463,12 @@ def _backward(cells: Cells) -> tuple[Array, Array]:
     return low, high
 
 
-def _forward(cells: Cells, low: Array, high: Array) -> tuple[Array, Array]:
+def _forward(cells: Cells, low: Array, high: Array, of: str) -> tuple[Array, Array]:
     """Return the largest x and y of each cell, if all x are between `low` and `high`."""
     begins = cells.begins
     ends = cells.ends
     x, y = np.empty((2, len(low)))
-    for part in reported("fastest, second pass", cells.parts):
+    for part in reported(f"{of} 2 of 2", cells.parts):
         A, B, C, D, E, F = cells.ellipses(part.start, part.stop)
         swapped = np.stack([C, B, A, E, D, F], axis=-1)  # limits on y and x
         for i, limits in enumerate(swapped.tolist(), part.start):
