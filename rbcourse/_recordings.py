@@ -50,7 +50,7 @@ _SPELLINGS = {
 _UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
 _MEANINGS = {
     "nanoseconds": r"(.*_)?(nsec|nsecs|nanosec|nanosecs|nanoseconds)",
-    "time": r"(.*_)?(time|times|timestamp|timestamps|stamp|t|sec|secs|seconds)",
+    "time": r"(.*_)?(time|times|timestamp|timestamps|stamp|t|ts|sec|secs|seconds)",
     "": r"(((.*_)?(pose|pos|position|t|trans|translation|location)|(.*_)?p(_[a-z]{1,2}){0,2})_?)?"
     r"(?P<axis>[xyz])(_(p|pos|position))?",
     "q": r"((.*_)?(quat|quaternion|orientation|rot|rotation|attitude)|(.*_)?q(_[a-z]{1,2}){0,2})_?"
@@ -192,14 +192,15 @@ def _increasing(
     """Return the increasing times of rows, by row, and the rows that `skip` leaves out."""
     ordered, last = dict[int, Decimal](), Decimal("-inf")
     dropped: dict[str, list[int]] = {"repeated": [], "unordered": []}
+    constant = len(stamps) > 2 and len(set(stamps)) == 1
     for i, stamp in zip(kept, stamps, strict=True):
         if stamp > last:
             ordered[i] = last = stamp
             continue
         kind, why = ("repeated", "equal to") if stamp == last else ("unordered", "earlier than")
-        if kind not in skip:
+        if constant or kind not in skip:
             cure = f"skip={kind!r} leaves such rows out"
-            if len(stamps) > 2 and len(set(stamps)) == 1:
+            if constant:
                 cure = "all times are equal, so they are not the times of the poses"
             raise ValueError(
                 f"{rows.place(i)}: the time {_short(stamp)} is {why} the time {_short(last)} of a "
@@ -212,7 +213,8 @@ def _increasing(
 def text_lines(file: File) -> list[str]:
     """Return the lines of a text file, without blank lines at the end.
 
-    A last line without a line end raises ValueError, because the file may have been cut there.
+    A last line without a line end raises ValueError, because the file may have been cut there, but
+    not if the last ten lines end with equal numbers of decimals, since a cut number has fewer.
     """
     with open(file, "rb") as stream:
         content = stream.read()
@@ -223,13 +225,17 @@ def text_lines(file: File) -> list[str]:
         raise ValueError(
             f"{file}, line {line}: the text is not in UTF-8; save the file as text in UTF-8"
         ) from error
-    if text and text.rstrip(" \t")[-1:] not in ("\n", "\r"):
+    lines = text.rstrip(" \t\r\n").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    ends = [re.search(r"\.\d{3,}$", line) for line in lines[-10:]]
+    decimals = {len(end[0]) if end else 0 for end in ends}
+    fixed = len(ends) > 2 and len(decimals) == 1 and 0 not in decimals
+    if text and not fixed and text.rstrip(" \t")[-1:] not in ("\n", "\r"):
         line = len(re.split("\r\n|\n|\r", text))
         raise ValueError(
             f"{file}, line {line}: the line has no line end, so the file may be cut; if it is "
             "complete, add a line end"
         )
-    return text.rstrip(" \t\r\n").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return lines
 
 
 def split_line(place: str, line: str, separator: str = ",") -> list[str]:
@@ -257,6 +263,11 @@ def _read_rows(file: File) -> _Rows:
     line before the numbers, or in a comment before them.
     """
     every, heads = text_lines(file), list[tuple[int, str, bool]]()
+    if every[0].startswith(("Format Version", "Objects")):
+        raise ValueError(
+            f"{file}, line 1: for files of Motive and Vicon, docs/recording.md has code that reads "
+            "them"
+        )
     for number, line in enumerate(every, start=1):
         text = line.strip()
         if text and text[0] not in "#%" and _has_number(text):

@@ -199,8 +199,9 @@ def read_path(
     ValueError
         If the format is not recognised; if times do not increase, or cannot be in s; if a number is
         missing; if the norm of a quaternion, or an entry of RᵀR, is off by more than 1e-3; or if
-        the last line has no line end, since the file may be cut there. The message names the line,
-        the reason, and the argument that helps.
+        the last line has no line end, since the file may be cut there, except if the last ten
+        lines end with equal numbers of decimals. The message names the line, the reason, and the
+        argument that helps.
 
     Examples
     --------

@@ -38,6 +38,7 @@ GOOD = {
         {"unit": "ns", "start": "first"},
         [0, 0.004999936],
     ),
+    "ts.txt": (f"# ts tx ty tz qx qy qz qw\n0.5 {ROW}\n", {}, [0.5]),
     "header_no_hash.txt": (f"timestamp tx ty tz qx qy qz qw\n0.0 {ROW}\n", {}, [0]),
     "open_vins.txt": (
         "# timestamp(s) tx ty tz qx qy qz qw Pr11 Pr12 Pr13\n"
@@ -171,7 +172,31 @@ GOOD = {
         [0.5],
     ),
 }  # fmt: skip
+MOTIVE = f"""\
+Format Version,1.23,Take Name,a,Rotation Type,Quaternion,Length Units,Meters,Coordinate Space,Global
+
+,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body
+,Name,Tool,Tool,Tool,Tool,Tool,Tool,Tool,Tool
+,ID,"5E","5E","5E","5E","5E","5E","5E","5E"
+,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Mean Marker Error
+Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,
+0,0.000000,{XYZW.replace(" ", ",")},{D},0.000214
+1,0.010000,,,,,,,,
+2,0.020000,{XYZW.replace(" ", ",")},{D},0.000214
+"""
+VICON = """\
+Objects
+100
+,,Tool:Tool,,,,,
+Frame,Sub Frame,RX,RY,RZ,TX,TY,TZ
+,,rad,rad,rad,mm,mm,mm
+1,0,0,0,1.2870022,1500,-250,750
+2,0,,,,,,
+3,0,0,0,1.2870022,1500,-250,750
+"""
 REFUSED = {
+    "motive.csv": (MOTIVE, "line 1: for files of Motive and Vicon, docs/recording.md has code"),
+    "vicon_tracker.csv": (VICON, "line 1: for files of Motive and Vicon"),
     "kitti.txt": (KITTI, "is a KITTI file, without times: times= takes a file"),
     "kitti_with_frame.txt": ("0 " + KITTI, "13 columns.*move the times to times="),
     "replica.txt": ("1 0 0 0 " * 4 + "\n", "16 columns.*reshape"),
@@ -231,6 +256,7 @@ REFUSED = {
     "twice.txt": (f"0 {ROW}\n0.1 {ROW}\n0.10 {ROW}\n", "line 3: .*skip='repeated'"),
     "back.txt": (f"0 {ROW}\n0.2 {ROW}\n0.1 {ROW}\n", "line 3: .*skip='unordered'"),
     "utf_16.csv": (f"{OWN}\n0,{ROWS}\n".encode("utf-16"), "line 1: the text is not in UTF-8"),
+    "a_few_decimals.txt": (f"0 {ROW}\n" * 3 + f"1 {ROW}", "line 4: the line has no line end"),
     "empty.txt": ("", "no line with numbers"),
 }  # fmt: skip
 
@@ -304,6 +330,16 @@ def test_relative_times_are_rounded_once(tmp_path):
         assert rb.read_path(file, unit=unit)[0].tolist() == list(map(float, stamps))
 
 
+def test_a_last_line_with_as_many_decimals_as_others_needs_no_line_end(tmp_path):
+    """A last line that was cut has fewer decimals, or fewer columns."""
+    rows = [f"0.{t}00 1.500 -0.250 0.750 0.0000 0.0000 0.6000 0.8000" for t in range(10)]
+    text = "\n".join(["# t x y z qx qy qz qw", *rows])
+    assert len(rb.read_path(written(tmp_path, "a.txt", text))[0]) == 10
+    for lost in range(1, len(rows[-1])):
+        with pytest.raises(ValueError, match=r"a\.txt, line 11: "):
+            rb.read_path(written(tmp_path, "a.txt", text[:-lost]))
+
+
 def test_skipped_rows_are_left_out_and_told(tmp_path, caplog):
     lost = "nan nan nan nan nan nan nan"
     rows = [f"0 {lost}", f"1 {ROW}", f"1 {ROW}", f"3 {ROW}", f"2 {ROW}", f"2.5 {ROW}", f"3 {ROW}"]
@@ -317,6 +353,8 @@ def test_skipped_rows_are_left_out_and_told(tmp_path, caplog):
         "left out repeated rows (2), in line 4, 8",
         "left out unordered rows (2), in line 6, 7",
     ]
+    with pytest.raises(ValueError, match="all times are equal"):
+        rb.read_path(written(tmp_path, "b.txt", f"0 {ROW}\n" * 3), skip="repeated")
     for skip in ("nan", ["nan", "unordered"]):
         with pytest.raises(ValueError, match=r"line 4: .*skip='repeated'"):
             rb.read_path(file, skip=skip)

@@ -156,8 +156,8 @@ def smoothing_spline(
     turn = c.period / (2 * np.pi) * np.sqrt(np.mean(np.sum(c.velocities**2, axis=1)))
     if turn > _DOMAIN:
         warnings.warn(
-            f"the body turns by {max(turn, 1.01 * _DOMAIN):.3g} rad in the time period/2π, and the closed form is near "
-            f"the optimum up to {_DOMAIN:g} rad; choose a shorter period, or "
+            f"the body turns by {max(turn, 1.01 * _DOMAIN):.3g} rad in the time period/2π, and the "
+            f"closed form is near the optimum up to {_DOMAIN:g} rad; choose a shorter period, or "
             "rbcourse.optimum.minimum_acceleration_smoothing",
             RuntimeWarning,
             stacklevel=2,
