@@ -82,7 +82,7 @@ class Thresholds:
     spun = 3.0, 1.15  # spin is added twice, to curves up to these cost ratios [once: 2]
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost [1: 1]
     needle = 300.0  # beyond this ratio of moments, the work is bounded [36 rods: at most 3 s each]
-    most_of_needles = 16  # promising curves of a needle [100: over 40 s for a third of them]
+    most_of_needles = 16  # promising curves [no bound: 3 of 6 rods of ratio 1e4 take over 20 s]
     most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
     promising = 1.3  # curves above this cost ratio are dropped before more steps [1.1: 1]
     starts = Steps(40, 5e-4)  # Gauss–Newton steps for starting curves [20 or 5e-3: 0]
