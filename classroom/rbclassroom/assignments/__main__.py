@@ -30,9 +30,12 @@ def main() -> None:
         elif task == "collect":
             rows = collect(known.folder, assignments, known.due)
             for kind in LISTS:
-                own = [f"  {what}: {why}" for name, what, why in rows if name == kind]
+                own = [(what, why) for name, what, why in rows if name == kind]
                 if own or kind == "collected":
-                    print(f"{kind}: {len(own)}", *own, sep="\n")
+                    print(f"{kind}: {len(own)}")
+                for reason in dict.fromkeys(why for _, why in own):
+                    same = (what for what, why in own if why == reason)
+                    print(f"  {'; '.join(same)}: {reason}")
         else:
             from rbclassroom.assignments.handout import make_handout, make_solutions
 

@@ -20,7 +20,7 @@ import nbformat
 from nbformat import NotebookNode
 
 from rbclassroom.assignments.downloads import File, find_files, find_owners, written
-from rbclassroom.assignments.submissions import count_found, read_notebook
+from rbclassroom.assignments.submissions import count_found, count_written, read_notebook
 from rbcourse.files import replace_file
 
 LISTS = ["collected", "unchanged", "renamed", "late", "duplicates", "unmatched", "refused"]
@@ -33,9 +33,10 @@ Owner = tuple[str, str]  # the number and the name of a student in the LMS
 def collect(folder: Path, assignments: Path, due: datetime | None = None) -> list[Row]:
     """Copy the notebooks in a folder to ``submitted/``, and return a row for each file.
 
-    If a student has several files for a set, the newest is used. A file in ``submitted/`` is
-    replaced only by a newer one. ``submitted/report.csv`` stores the rows, and keeps those of other
-    sets and other students from earlier runs.
+    If a student has several files for a set, the newest is used, and of files with the same date
+    the one with more answers. A file in ``submitted/`` is replaced only by a newer one.
+    ``submitted/report.csv`` stores the rows, and keeps those of other sets and other students from
+    earlier runs.
     """
     if not folder.is_dir():
         raise ValueError(f"folder: an existing folder is wanted, got {folder}")
@@ -55,7 +56,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         rows += _renamed(f"{who}/{name}", owner, owners, assignments)
         owners[f"{who}/{name}"] = owner
         labels[who] = owner
-        rows += [("duplicates", other.label, f"{best.label} is used instead") for other in others]
+        rows += [("duplicates", other.label, _why_not(other, best)) for other in others]
         rows.append(_take(best, submitted / who / name))
         if late := _why_late(best.about, due):
             rows.append(("late", f"{who}, {name}", late))
@@ -128,9 +129,9 @@ def _grouped(
         named = _named(Path(about["file"]).stem, sets)
         if file.kind or not name:
             why = file.why or "it is not a notebook of a handout"
-        elif named and name not in named:
-            why = f"its name is {named[0]}, its cells are of {name}"
         else:
+            if named and name not in named:
+                file.why = f"its name is {named[0]}, its cells are of {name}"
             groups[name, student, about["id"] or about["folder"] or about["name"]].append(file)
             usable.add(label)
             continue
@@ -143,11 +144,20 @@ def _grouped(
     return dict(sorted(groups.items())), rows, labels
 
 
-def _rank(file: File) -> tuple[int, str, bool, str]:
+def _rank(file: File) -> tuple[bool, int, str, int, bool, str]:
     """Order the notebooks of a student for a set; the last one is used."""
     prepared = "/to_submit/" in f"/{file.about['file']}"  # the student's check wrote the file
+    written = count_written(read_notebook(file.content, "it"))
     # Canvas gives larger numbers to later uploads
-    return int(file.about["number"] or 0), file.about["date"], prepared, file.label
+    upload = int(file.about["number"] or 0)
+    return not file.why, upload, file.about["date"], written, prepared, file.label
+
+
+def _why_not(other: File, best: File) -> str:
+    """Return why another file of the student is not used."""
+    same = ", of the same date," * (_rank(other)[:3] == _rank(best)[:3])
+    more = " with more answers" * (bool(same) and _rank(other)[3] < _rank(best)[3])
+    return f"{best.label}{same}{more} is used instead"
 
 
 def _namesakes(groups: Iterable[Group], submitted: Path) -> Iterator[Row]:
@@ -216,9 +226,11 @@ def _why_late(about: dict[str, str], due: datetime | None) -> str:
         return "Canvas marks it as late"
     if not due or about["number"] or about["date"] <= written(due):
         return ""
+    date = datetime.fromisoformat(about["date"].replace(" UTC", "+00:00"))
+    local = f"{date.astimezone():%Y-%m-%d %H:%M:%S}"
     if about["exact"]:
-        return f"handed in at {about['date']}"
-    return f"perhaps: {about['date']} may be the date of the download; look in Moodle"
+        return f"handed in at {local}"
+    return f"perhaps: {local} may be the date of the download; look in Moodle"
 
 
 def read_owners(assignments: Path) -> dict[str, Owner]:
@@ -294,14 +306,16 @@ def _take(best: File, place: Path) -> Row:
     """Write an upload to its folder, unless a newer file is there; return a row for the report."""
     date = best.about["date"]
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
-    why = f"{place.parent.name}, {place.name}"
+    why = f"{place.parent.name}, {place.name}" + f": {best.why}" * bool(best.why)
     if target.exists():
         # keep a file without a stamp, because it was not collected
         old = stamp.read_text(encoding="utf-8").strip() if stamp.exists() else "later"
-        if target.read_bytes() == best.content or date == old:
+        if target.read_bytes() == best.content:
             return "unchanged", best.label, why
-        if date < old:
-            return "duplicates", best.label, f"{why}: the file collected before is newer"
+        if date <= old:
+            age = "has the same date" if date == old else "is newer"
+            kept = f"the file collected before {age}; delete it to use this one"
+            return "duplicates", best.label, f"{why}: {kept}"
         why += ": it replaces the file collected before"
     place.mkdir(parents=True, exist_ok=True)
     replace_file(target, best.content)

@@ -39,6 +39,7 @@ CANVAS = re.compile(  # a file: berganna_LATE_12345_67890_ps1.ipynb, but not 202
 DATES = "%Y-%m-%d-%H-%M-%S", "%b %d, %Y %I%M %p"  # of Blackboard and Brightspace
 PERSON = re.compile(r"[^\W\d_a-z]\w+[ _]+[^\W\d_a-z]\w+")  # as in "Anna Berg - ps1.ipynb"
 GENERIC = {"to_submit", "work", "submissions", "submission", "downloads", "assignments", "email"}
+GENERIC |= {"late", "abgabe", "abgaben"}  # no names of students
 JUNK = re.compile(r"/(__MACOSX|\.ipynb_checkpoints|original)/|/(\._[^/]*|\.DS_Store)$")
 FILE_BYTES, UPLOAD_BYTES, DOWNLOAD_BYTES = 30_000_000, 100_000_000, 4_000_000_000
 UNKNOWN = -1  # the level of a notebook that cannot be assigned to a student
@@ -147,12 +148,9 @@ def find_owners(files: list[File]) -> None:
     levels = {at: k for at, k in _levels(notebooks, 0, found).items() if k != UNKNOWN}
     above = {parts[: levels[at]] for at, parts in notebooks.items() if at in levels}
     for at, parts in loose.items():
-        level = next((k for k in range(len(parts) - 1) if parts[:k] in above), 0)
-        if (
-            parts[:level] in above
-            and levels.get(at, level) == level
-            and (at in levels or files[at].kind)
-        ):
+        first = next((k for k in range(len(parts) - 1) if parts[:k] in above), 0)
+        level = levels.get(at, first)
+        if parts[:level] in above and (at in levels or files[at].kind):
             name, folder = parts[level].removesuffix(".zip"), "/".join(parts[: level + 1])
             about = {"name": name, "folder": folder, "file": "/".join(parts[level + 1 :])}
             files[at].about = _about(about, files[at], level)
@@ -163,11 +161,13 @@ def _levels(notebooks: dict[int, tuple[str, ...]], level: int, found: list[str])
 
     `found` has the sets of the files. A folder belongs to a class if folders in it have notebooks
     of the same set, and its student is unknown if its notebooks have the names of several persons.
+    If only the folders in a folder have names of persons, each name once, these are the students.
     """
     below = defaultdict[str, dict[int, tuple[str, ...]]](dict)
     for at, parts in notebooks.items():
         if len(parts) > level + 1:
             below[parts[level]][at] = parts
+    again = Counter(pair[-1] for pair in {parts[level : level + 2] for parts in notebooks.values()})
     own, deeper, classes = dict[int, int](), dict[int, int](), False
     for folder, inside in below.items():
         direct = {at: parts for at, parts in inside.items() if len(parts) == level + 2}
@@ -177,11 +177,15 @@ def _levels(notebooks: dict[int, tuple[str, ...]], level: int, found: list[str])
         )
         sets = Counter(name for name, _ in students)
         persons = {m[0] for parts in direct.values() if (m := PERSON.search(parts[-1]))}
+        inner = {parts[level + 1] for parts in inside.values()}
+        named = all(PERSON.search(name) and again[name] == 1 for name in inner)
+        is_generic = folder.removesuffix(".zip").casefold() in GENERIC.union(found)
+        is_only_around = not direct and named and not PERSON.search(folder)
         is_class = not direct and max(sets.values(), default=0) > 1
         classes = classes or is_class
         if len(persons) > 1 or (not direct and UNKNOWN in under.values()):
             own |= dict.fromkeys(inside, UNKNOWN)
-        elif folder.removesuffix(".zip").casefold() in GENERIC.union(found) or is_class:
+        elif is_generic or is_class or is_only_around:
             own |= under
         else:
             own |= dict.fromkeys(inside, level)

@@ -121,15 +121,55 @@ def test_each_notebook_is_assigned_to_its_problem_set(course):
     }
     rows = collected(course, given)
     assert [why for _, why in of("unmatched", rows)] == [
-        "its name is ps1, its cells are of ps2",
         "it is not a notebook of a handout",
         "it is not a notebook of a handout",
         "neither its name nor a folder names a student",
     ]
     assert "damaged or not a notebook" in of("refused", rows)[0][1]
-    wanted = {f"{who}/ps1" for who in "abcej"} | {"d/ps2"}
+    wanted = {f"{who}/ps1" for who in "abcej"} | {"d/ps2", "f/ps2"}
     assert files(course).keys() == wanted
-    assert [who for who, _ in of("nothing usable", rows)] == ["F 1", "G 2", "H 3", "I 4"]
+    assert dict(of("collected", rows))[moodle("F_1")].endswith(
+        "f, ps2: its name is ps1, its cells are of ps2"
+    )
+    assert [who for who, _ in of("nothing usable", rows)] == ["G 2", "H 3", "I 4"]
+
+
+def test_a_file_with_the_name_of_another_set_counts_only_without_a_better_one(course):
+    one, other = answered(course, "named"), answered(course, "misnamed")
+    collected(course, {"a.zip": packed({moodle("A_1"): one}, DAY)})
+    collected(course, {"b.zip": packed({moodle("A_1", "ps2.ipynb"): other}, LATER)})
+    assert files(course) == {"a/ps1": "named"}
+
+
+def blank(course):
+    """Return the set as it is handed out."""
+    notebook = nbformat.read(course / "source" / "ps1" / "ps1.ipynb", as_version=4)
+    for cell in notebook.cells:
+        if "BEGIN SOLUTION" in cell.source:
+            code = "# YOUR CODE HERE\nraise NotImplementedError()"
+            cell.source = code if cell.cell_type == "code" else "YOUR ANSWER HERE"
+    notebook.cells.append(new_markdown_cell("blank", id="own"))
+    return nbformat.writes(notebook).encode()
+
+
+@pytest.mark.parametrize("solved", ["a.ipynb", "z.ipynb"])
+def test_of_two_files_of_a_date_the_one_with_more_answers_is_used(course, solved):
+    given = {moodle("A_1", "m.ipynb"): blank(course), moodle("A_1", solved): answered(course)}
+    rows = collected(course, {"all.zip": packed(given)})
+    assert files(course) == {"a/ps1": "mine"}
+    label = f"all.zip: {moodle('A_1', solved)}"
+    (why,) = dict(of("duplicates", rows)).values()
+    assert why == f"{label}, of the same date, with more answers is used instead"
+
+
+def test_another_file_of_the_date_of_a_collected_one_is_not_unchanged(course):
+    collected(course, {"all.zip": packed({moodle("A_1"): blank(course)})})
+    rows = collected(course, {"all.zip": packed({moodle("A_1"): answered(course)})})
+    why = "a, ps1: the file collected before has the same date; delete it to use this one"
+    assert rows == [("duplicates", f"all.zip: {moodle('A_1')}", why)]
+    (course / "submitted" / "a" / "ps1" / "ps1.ipynb").unlink()
+    collected(course, {})
+    assert files(course) == {"a/ps1": "mine"}
 
 
 def test_different_encodings_of_a_name_identify_one_student(course):
@@ -349,6 +389,12 @@ def test_each_file_is_assigned_to_its_student(course, layout, packing):
         (["Al/hw_1_2_ps1.ipynb", "Al/hw_3_4_ps1.ipynb", "Al/ps1.ipynb", "Bo/ps1.ipynb"], "al bo"),
         (["c/s/Al/2026_1_3_a.ipynb", "c/s/Bo/2026_1_3_a.ipynb", "c/s/Bo/old/a.ipynb"], "al bo"),
         (["Al/a.ipynb", "Al/old/a.ipynb", "Al/b.zip/a.ipynb", "Bo/a.ipynb"], "al bo"),
+        (["extra/Wes Wu/ps1.ipynb"], "wes_wu"),
+        (["extra/Wes Wu/ps1.ipynb", "Bo Ek/ps1.ipynb"], "bo_ek wes_wu"),
+        (["extra/Wes Wu/ps1.ipynb", "bo/work_1/ps1.ipynb"], "bo wes_wu"),
+        (["late/wes/ps1.ipynb", "abgabe/Bo/ps1.ipynb"], "bo wes"),
+        (["Wes Wu/My Files/ps1.ipynb", "Bo Ek/Abgabe/ps1.ipynb"], "bo_ek wes_wu"),
+        (["wes/My Files/ps1.ipynb", "bo/My Files/ps1.ipynb"], "bo wes"),
     ],
 )
 def test_the_level_of_the_students_is_found(course, paths, wanted):
@@ -469,7 +515,8 @@ def test_only_newer_downloads_replace_collected_files(course):
     assert "replaces" in of("collected", rows)[0][1]
     assert files(course)["a/ps1"] == "newest"
     (course / "submitted/a/ps1/ps1.ipynb").write_bytes(answered(course, "corrected by hand"))
-    assert of("unchanged", collected(course, {}))
+    why = dict(of("duplicates", collected(course, {})))[f"b.zip: {name}"]
+    assert "has the same date; delete it" in why
     assert files(course)["a/ps1"] == "corrected by hand"
 
 
@@ -480,7 +527,7 @@ def test_late_files_are_reported(course):
     rows = collected(course, {"a.zip": packed(entries, LATER)}, datetime(2026, 12, 1, 23, 59))
     late, stamp = dict(of("late", rows)), (course / "submitted/a/ps1/timestamp.txt").read_text()
     assert set(late) == {"a, ps1", "c_3, ps1", "anon_d, ps1", "ek, ps1"}
-    assert late["a, ps1"].startswith(f"perhaps: {stamp.strip()} may be")
+    assert late["a, ps1"].startswith("perhaps: 2026-12-02 12:00:00 may be")
     assert late["ek, ps1"].startswith("handed in at 2026-12-03")
     assert len(of("collected", rows)) == 5
     offset = datetime(*LATER).astimezone().utcoffset()
@@ -491,6 +538,8 @@ def test_the_command_prints_each_list(course, monkeypatch):
     folder = course.parents[1]
     (folder / "downloads" / "Ö X_1_assignsubmission_file_ps1.ipynb").write_bytes(answered(course))
     (folder / "downloads" / "notes.txt").write_bytes(b"")
+    both = dict.fromkeys((moodle("A_2"), moodle("B_3")), answered(course))
+    (folder / "downloads" / "all.zip").write_bytes(packed(both))
     done = subprocess.run(
         [*MODULE, "rbclassroom.assignments", "collect", "downloads", "--due", "2000-01-01 12:00"],
         cwd=folder,
@@ -500,7 +549,8 @@ def test_the_command_prints_each_list(course, monkeypatch):
     )
     assert done.stderr == ""
     heads = [line for line in done.stdout.splitlines() if not line.startswith(" ")]
-    assert heads == ["collected: 1", "late: 1", "ignored: 1"]
+    assert heads == ["collected: 3", "late: 3", "ignored: 1"]
+    assert "  a, ps1; b, ps1: perhaps: 2026-11-20 12:00:00 may be the date" in done.stdout
     monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
     with pytest.raises(SystemExit, match="folder: an existing folder is wanted, got nowhere"):
         main()
