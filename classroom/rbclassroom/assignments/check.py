@@ -110,7 +110,8 @@ def _find_set(notebook: NotebookNode, folder: Path) -> tuple[str, dict[str, byte
 def _keep(notebook: NotebookNode, name: str, data: bytes, folder: Path) -> None:
     """Write the accepted functions of a set to the student's file."""
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    own = [(grade_id(c), c.source) for c in code if is_answer(c) or grade_id(c) in ("", "setup")]
+    kept = [c for c in code if is_answer(c) or is_test(c) or grade_id(c) in ("", "setup")]
+    own = [(grade_id(c), "" if is_test(c) else c.source) for c in kept]
     tests = [grade_id(c) for c in code if is_test(c) and c.execution_count and not _error(c)]
     mine = find(folder, name)
     if not all(cell.execution_count for cell in code if is_test(cell) and cell.source.strip()):

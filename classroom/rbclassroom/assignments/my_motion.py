@@ -127,8 +127,9 @@ def keep(
     """Return the text of the student's file with the accepted functions of a set, and a message.
 
     `text` is the file before; it may be empty. `name` is the name of the set, and `data` the text
-    of its ``NAME.json``. `cells` has names and code of the student's cells, and `passed` the
-    problems whose tests have passed. The new file is run, and must pass these tests, too.
+    of its ``NAME.json``. `cells` has names and code of the student's cells, in their order, and
+    may have the tests without their code. `passed` has the problems whose tests have passed. The
+    last definition before the test of a problem counts. The new file must pass these tests, too.
     """
     problems = {slug: each for slug, each in loaded(data).items() if isinstance(each, dict)}
     wanted = {k: each["keep"] for k, each in problems.items() if "keep" in each and k in passed}
@@ -226,13 +227,15 @@ def _code_of(node: ast.stmt, lines: list[str], given: Sequence[str | None]) -> s
 
 def _needed(cells: Cells, wanted: dict[str, str], given: Sequence[str | None]) -> list[_Statement]:
     """Return the statements that the wanted functions need, in the order of the cells."""
-    read = [(cell, each) for cell, text in cells for each in _read(text, given)]
+    read = [(at, each) for at, (_, text) in enumerate(cells) for each in _read(text, given)]
     course = re.compile(r"from (rbclassroom|my_motion)\b|import my_motion\b|.*= mine\(")
-    read = [(cell, each) for cell, each in read if not course.match(ast.unparse(each.node))]
+    read = [(at, each) for at, each in read if not course.match(ast.unparse(each.node))]
     kept = list[ast.stmt]()
     for slug, function in wanted.items():
-        ends = [k for k, (cell, _) in enumerate(read, 1) if cell == f"{slug}-answer"]
-        above = [each for _, each in read[: max(ends, default=0)]]
+        ends = [
+            at for at, (cell, _) in enumerate(cells) if cell in (f"{slug}-answer", f"{slug}-test")
+        ]
+        above = [each for at, each in read if at <= max(ends, default=-1)]
         target = [each.node for each in above if function in each.binds][-1:]
         nodes = [each.node for each in above]
         kept += [*needed(nodes, target), *target]

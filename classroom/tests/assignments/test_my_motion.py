@@ -6,6 +6,7 @@ import re
 import nbformat
 import numpy as np
 import pytest
+from nbformat.v4 import new_code_cell
 from quick import quick_for
 from test_problems import SETS, SOURCE, TABLES, cells
 
@@ -215,6 +216,10 @@ def test_the_check_writes_the_file_and_the_next_set_uses_it(tmp_path, capsys):
         notebook, right = nbformat.reads(files[f"{name}.ipynb"].decode(), 4), dict(answers(name))
         for cell in notebook.cells:
             cell.source = right.get(cell.metadata.nbgrader.grade_id, cell.source)
+        if name == "ps4":  # the answer is in an added cell, above its test
+            at = [c.metadata.nbgrader.grade_id for c in notebook.cells].index("geodesic-answer")
+            notebook.cells.insert(at + 1, new_code_cell(notebook.cells[at].source))
+            notebook.cells[at].source = "def geodesic(*given):\n    raise NotImplementedError()"
         nbformat.write(notebook, tmp_path / name / f"{name}.ipynb")
         before = (tmp_path / FILE).read_text("utf-8") if (tmp_path / FILE).exists() else ""
         submitted = check(tmp_path / name / f"{name}.ipynb")
@@ -222,6 +227,7 @@ def test_the_check_writes_the_file_and_the_next_set_uses_it(tmp_path, capsys):
         assert (kept.read_text("utf-8") if kept.exists() else "") == before
         assert f"{FILE} has your" in capsys.readouterr().out
     assert "def screw" in (tmp_path / FILE).read_text("utf-8")
+    assert "NotImplementedError" not in (tmp_path / FILE).read_text("utf-8")
     outputs = [cell.get("outputs") for cell in nbformat.read(submitted, 4).cells]
     assert f"exp_so3, log_so3, nearest_rotation: your own, from {FILE}" in str(outputs)
 
