@@ -293,7 +293,8 @@ class _Restoring:
         found = self.search(given, gap) if is_answer(given) else []
         if found:
             _fill(new, found)
-            self.changes.append((name, "has the text of an added cell"))
+            lost = "was found by its function or its place"
+            self.changes.append((name, "has the text of an added cell" if old else lost))
         elif any(_defines(cell, given) for cell in self.cells[:end] if cell is not old):
             new.source = ELSEWHERE
             self.changes.append((name, "is empty; another cell has its function"))

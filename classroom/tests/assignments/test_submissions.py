@@ -198,6 +198,7 @@ UNCOMMENTED = "def square(x):\n    raise NotImplementedError()"
 SQUARE_STUB = "def square(x):\n    # YOUR CODE HERE\n    raise NotImplementedError()"
 LOST = "8 cells have lost the marks"
 ADDED = "has the text of an added cell"
+PLACE = "was found by its function or its place"
 CHANGED = "was changed; it is restored"
 # The changes that a human reader overlooks: each answer is found. A row has a change, the number
 # of added cells that stay, and parts of the remarks.
@@ -205,24 +206,24 @@ FOUND = {
     "no metadata": (of_every_cell(without_marks), 0, [LOST]),
     "no ids and no outputs": (of_every_cell(without_fields), 0, []),
     "Colab": (of_every_cell(from_colab), 0, [LOST]),
-    "Deepnote": (of_every_cell(from_deepnote), 0, ["5 cells", *[ADDED] * 3]),
+    "Deepnote": (of_every_cell(from_deepnote), 0, ["5 cells", *[PLACE] * 3]),
     "version 3": (as_version_3, 0, []),
     "version 5": (as_version_5, 0, []),
     "no types": (of_every_cell(without_types), 0, []),
     "odd fields": (of_every_cell(with_odd_fields), 0, []),
     "lines without ends": (of_every_cell(as_lines_without_ends), 0, []),
     "ends of lines of Windows": (of_every_cell(with_crlf_and_spaces), 0, []),
-    "answer merged into its test": (merged(SQUARE, 1), 0, [CHANGED, ADDED]),
+    "answer merged into its test": (merged(SQUARE, 1), 0, [CHANGED, PLACE]),
     "test merged into its answer": (merged(SQUARE, 0), 0, ["was missing"]),
-    "answer merged into the test above": (merged(SQUARE_TEST, 0), 0, [CHANGED, ADDED]),
+    "answer merged into the test above": (merged(SQUARE_TEST, 0), 0, [CHANGED, PLACE]),
     "test merged into the answer below": (merged(SQUARE_TEST, 1), 0, ["was missing"]),
-    "words merged into the question": (merged(QUESTION, 0), 0, [CHANGED, ADDED]),
+    "words merged into the question": (merged(QUESTION, 0), 0, [CHANGED, PLACE]),
     "question merged into the words": (merged(QUESTION, 1), 0, ["was missing"]),
     "split function": (split(SQUARE, "(x):\n"), 0, ["was split"]),
     "split function without marks and ids": (
         in_order(split(SQUARE, "(x):\n"), of_every_cell(from_deepnote)),
         0,
-        ["5 cells", *[ADDED] * 3],
+        ["5 cells", *[PLACE] * 3],
     ),
     "split words": (split(WORDS, "It is: "), 0, ["was split"]),
     "split test": (split(SQUARE_TEST, "square(2)"), 0, ["was split"]),
@@ -233,7 +234,7 @@ FOUND = {
     "function in the last cell": (in_added_cell(SQUARE, 8, UNCOMMENTED), 0, [ADDED]),
     "number in an added cell": (in_added_cell(HALF, HALF + 1), 0, [ADDED]),
     "words in an added cell": (in_added_cell(WORDS, 8, "YOUR ANSWER HERE"), 0, [ADDED]),
-    "answer cell deleted": (in_added_cell(SQUARE, SQUARE, keep=False), 0, [ADDED]),
+    "answer cell deleted": (in_added_cell(SQUARE, SQUARE, keep=False), 0, [PLACE]),
     "no locked cells": (removed(TITLE, SQUARE_TEST, QUESTION), 0, ["was missing"] * 3),
     "answers as Markdown": (made("markdown", SQUARE, HALF), 0, ["was made a markdown cell"] * 2),
     "raw cells": (made("raw", SQUARE, SQUARE_TEST, WORDS), 0, ["was made a raw cell"] * 3),
