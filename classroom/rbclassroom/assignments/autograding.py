@@ -12,6 +12,7 @@ import re
 import shutil
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any, cast
 
@@ -164,6 +165,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
 
     def start_new_kernel(self, **kwargs: Any) -> None:
         """Start the kernel with the environment variables of the sandbox."""
+        self.began = time.monotonic()
         super().start_new_kernel(env=sandbox.environment(self.folder), **kwargs)
 
     def preprocess_cell(self, cell: NotebookNode, resources: Any, index: int) -> Any:
@@ -172,9 +174,11 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             return super().preprocess_cell(cell, resources, index)
         except (DeadKernelError, CellTimeoutError) as error:
             where = name_cell(self.nb.cells, index)
-            why = f"Python ended in or before {where}, or {self.seconds} s were over; grade by hand"
-            stuck = isinstance(error, CellTimeoutError)
-            raise Refused(f"{where} cannot be stopped" if stuck else why) from error
+            if isinstance(error, CellTimeoutError):
+                raise Refused(f"{where} cannot be stopped") from error
+            over = self.boxed and time.monotonic() - self.began >= self.seconds
+            what = f"the {self.seconds} s for the notebook were over" if over else "Python ended"
+            raise Refused(f"{what} in or before {where}; grade by hand") from error
 
 
 class FeedbackExporter(HTMLExporter):

@@ -91,7 +91,7 @@ CLASS = [
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),
     ("nosy", None, {"square": NOSY}, "0 1", []),
-    ("dies", None, {"half": DIES}, " ", [f"Python ended in or before {HALF}, or 600 s were over"]),
+    ("dies", None, {"half": DIES}, " ", [f"Python ended in or before {HALF}; grade by hand"]),
 ]
 FILES = [
     ("pdf", "ps0.ipynb", b"%PDF-1.7 \xff", "ps0.ipynb is a PDF or an archive, not a notebook"),
