@@ -34,7 +34,9 @@ from rbclassroom.assignments.locked_cells import is_answer, is_test, marks_of, n
 from rbclassroom.assignments.marking import EMPTY
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 from rbclassroom.assignments.submissions import Refused, read_notebook, restore
+from rbcourse.files import replace_file
 
+RUN = "run.json"  # beside a graded notebook: its run for the page
 SHOWN = {"text/plain", "text/html", "text/markdown", "text/latex"}
 SHOWN |= {"image/png", "image/jpeg", "image/svg+xml"}
 UNSEEN = "The visible tests pass, but a hidden test fails.\n"
@@ -56,6 +58,8 @@ def configure(config: Config) -> None:
         path = os.environ.get("PATH", os.defpath)
         os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{path}"
     end = nbgrader.CheckCellMetadata
+    ignored = [".ipynb_checkpoints", "*.pyc", "__pycache__", "feedback"]  # nbgrader's own list
+    config.CourseDirectory.ignore = [*ignored, RUN]  # the run is not copied to the page
     config.Autograde.exporter_class = ReadSubmission
     config.Autograde.sanitize_preprocessors = [RestoreCells, nbgrader.OverwriteKernelspec, end]
     run = [BoxedExecute, nbgrader.IgnorePattern, nbgrader.SaveAutoGrades]
@@ -65,7 +69,7 @@ def configure(config: Config) -> None:
     config.IgnorePattern.pattern = r"(?s)."
     # the feedback shows a run without hidden tests, with the scores from the gradebook
     clear = [nbgrader.ClearHiddenTests, nbgrader.ClearMarkScheme, nbgrader.ClearOutput]
-    shown = [GetResults, *clear, BoxedExecute, Summarise, CSSHTMLHeaderPreprocessor]
+    shown = [GetResults, *clear, ExecuteOnce, Summarise, CSSHTMLHeaderPreprocessor]
     config.GenerateFeedback.preprocessors = shown
     config.GenerateFeedback.exporter_class = FeedbackExporter
     config.FeedbackExporter.template_name = "page"
@@ -133,7 +137,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             sandbox.delete(self.folder)
         remarks = nb.metadata.setdefault("remarks", [])
         for at, cell in enumerate(nb.cells):
-            outputs, marks = cell.get("outputs", []), marks_of(cell)
+            outputs = cell.get("outputs", [])
             errors = {output.get("ename") for output in outputs} - {None}
             faults = [f"stopped after {self.timeout} s"] * (at in self.slow)
             faults += [CUT] * (at in self.cut)
@@ -148,10 +152,6 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
                 output.data = NotebookNode({k: v for k, v in output.data.items() if k in SHOWN})
                 if "text/latex" in output.data:
                     output.data["text/latex"] = without_links(output.data["text/latex"])
-            # scores are known only while feedback is made
-            failed = marks.get("points") and not marks.get("score", True)
-            if is_test(cell) and failed and not errors:
-                outputs.append(new_output("stream", name="stdout", text=UNSEEN))
         return nb, resources
 
     def create_kernel_manager(self) -> Any:
@@ -179,6 +179,23 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             over = self.boxed and time.monotonic() - self.began >= self.seconds
             what = f"the {self.seconds} s for the notebook were over" if over else "Python ended"
             raise Refused(f"{what} in or before {where}; grade by hand") from error
+
+
+class ExecuteOnce(BoxedExecute):
+    """Run a graded notebook for its page, or take the stored run, which grading deletes."""
+
+    def preprocess(self, nb: NotebookNode, resources: Any, km: Any = None) -> Any:
+        """Return the notebook with the outputs of its run, and with its present marks."""
+        step, about = cast(Any, self.parent), resources["nbgrader"]
+        course, job = step.parent.coursedir, (about["student"], about["assignment"])
+        stored = Path(course.format_path(course.autograded_directory, *job), RUN)
+        if not stored.exists():
+            nb, resources = super().preprocess(nb, resources, km)
+            replace_file(stored, nbformat.writes(nb).encode())
+        ran = nbformat.read(stored, as_version=4)
+        for cell, now in zip(ran.cells, nb.cells, strict=True):
+            cell.metadata = now.metadata
+        return ran, resources
 
 
 class FeedbackExporter(HTMLExporter):
@@ -212,6 +229,10 @@ class Summarise(nbgrader.NbGraderPreprocessor):
         data = Path(source, f"{about['assignment']}.json")
         table = json.loads(data.read_text("utf-8")) if data.exists() else {}
         graded = [at for at, cell in enumerate(nb.cells) if marks_of(cell).get("grade")]
+        for cell in (nb.cells[at] for at in graded if is_test(nb.cells[at])):
+            failed = marks_of(cell)["points"] and not marks_of(cell)["score"]
+            if failed and not any("ename" in output for output in cell.outputs):
+                cell.outputs.append(new_output("stream", name="stdout", text=UNSEEN))
         rows = [_row(nb.cells, at, table) for at in graded]
         tests, words = ([row for row in rows if row["test"] == kind] for kind in (True, False))
         resources["summary"] = {

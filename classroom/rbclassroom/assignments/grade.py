@@ -1,7 +1,7 @@
 """Grade each submission of a problem set; write the feedback and a table of the points."""
 
 import glob
-import json
+import hashlib
 import logging
 import os
 import re
@@ -10,7 +10,7 @@ import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
@@ -18,14 +18,17 @@ from threading import Thread
 from typing import Any
 
 import nbformat
+from nbformat import NotebookNode
 from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.converters import Autograde, GenerateAssignment, GenerateFeedback
 from nbgrader.coursedir import CourseDirectory
 from nbgrader.utils import capture_log, rmtree
 from traitlets.config import Config
 
+import rbclassroom
+import rbcourse
 from rbclassroom.assignments import sandbox
-from rbclassroom.assignments.autograding import configure
+from rbclassroom.assignments.autograding import RUN, configure
 from rbclassroom.assignments.collect import read_owners, read_report, write_csv
 from rbclassroom.assignments.handout import find_set, pack, read_config
 from rbclassroom.assignments.locked_cells import grade_id, is_answer, marks_of
@@ -36,7 +39,6 @@ from rbcourse.files import replace_file
 WORKERS = 2  # number of students graded at the same time
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
-PROGRESS = "grading.json"  # the file with the results of a run that is not complete
 Job = tuple[str, str]  # the name of a set, and the name of a student
 Row = dict[str, Any]
 Points = set[tuple[str, str, float]]  # students, sets, and points
@@ -49,8 +51,8 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
     If there is no sandbox, ValueError is raised and nothing is run or written, unless `without_box`
     is true. Points given by hand are kept. A submission that is refused loses its feedback and its
     earlier automatic points. If a student's points exceed the maximum, or change while another
-    student is graded, ValueError is raised and no table is written. If a run was interrupted, the
-    next one continues, with the submissions whose files have changed and those not yet graded.
+    student is graded, ValueError is raised and no table is written. A submission that was graded,
+    also in an interrupted run, does not run again until its file, its set or the package changes.
     """
     chosen = list(names) or sorted({path.name for path in assignments.glob("submitted/*/*/")})
     if not chosen:
@@ -61,18 +63,14 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
             raise ValueError(f"No submission was run, because there is no sandbox: {why}; {how}.")
         print(f"Submissions run without a sandbox and with all your rights: {why}.", flush=True)
     jobs = [job for name in dict.fromkeys(chosen) for job in _prepare(name, assignments)]
-    progress = _Progress(assignments, jobs, boxed=not why)
-    if progress.results:
-        print(f"The earlier run continues: {len(progress.results)} submissions are graded.")
     tables, rows = list[Path](), dict[Job, Row]()
     try:
         for name in dict.fromkeys(chosen):
             own = [job for job in jobs if job[0] == name]
-            _grade_set(own, progress, assignments, rows)
+            _grade_set(own, assignments, rows, boxed=not why)
             tables.append(_write_table(name, [rows[job] for job in own], assignments))
-            progress.forget(own)
     except KeyboardInterrupt:
-        count = f"{len({*rows, *progress.results})} of {len(jobs)} submissions are graded"
+        count = f"{len(rows)} of {len(jobs)} submissions are graded"
         print(f"Stopped: {count}. Run this again to continue; then the tables are written.")
         raise SystemExit(130) from None
     return tables
@@ -138,8 +136,11 @@ def _prepare(name: str, assignments: Path) -> list[Job]:
     except PermissionError as error:
         raise ValueError(f"{table} cannot be written; close it in other programs") from error
     before = Path(config.CourseDirectory.root, "gradebook.db")
-    if before.exists() and not (assignments / PROGRESS).exists():
-        replace_file(before.with_name(f"gradebook.before-{name}.db"), before.read_bytes())
+    copy = before.with_name(f"gradebook.before-{name}.db")
+    # a copy that is newer than the table is from a run that is not complete
+    copied, written = (path.stat().st_mtime if path.exists() else 0 for path in (copy, table))
+    if before.exists() and copied <= written:
+        replace_file(copy, before.read_bytes())
     update(find_set(name, assignments))
     done = run_step(GenerateAssignment, config)
     if not done["success"]:
@@ -157,58 +158,35 @@ def _without_ctrl_c() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-class _Progress:
-    """The remarks on the submissions graded in a run, stored until the tables are written."""
-
-    def __init__(self, assignments: Path, jobs: list[Job], boxed: bool) -> None:
-        self.path, self.boxed = assignments / PROGRESS, boxed
-        self.states = {job: [boxed, *_state(job, assignments)] for job in jobs}
-        self.results: dict[Job, list[str]] = {}
-        stored = json.loads(self.path.read_text("utf-8")) if self.path.exists() else []
-        for name, student, state, result in stored:
-            if self.states.get((name, student)) == state:
-                self.results[name, student] = result
-
-    def keep(self, job: Job, remarks: list[str]) -> None:
-        self.results[job] = remarks
-        rows = [[*job, self.states[job], kept] for job, kept in self.results.items()]
-        replace_file(self.path, json.dumps(rows).encode())
-
-    def forget(self, jobs: list[Job]) -> None:
-        for job in jobs:
-            self.results.pop(job, None)
-        if not self.results:
-            self.path.unlink(missing_ok=True)
-
-
-def _state(job: Job, assignments: Path) -> list[list[Any]]:
-    """Return the names, sizes and dates of the files of a submission and of its set."""
+def _state(job: Job, assignments: Path, boxed: bool) -> str:
+    """Return a hash of all that decides a result, and of the stored automatic points."""
     name, student = job
-    folders = assignments / "submitted" / student / name, find_set(name, assignments)
+    course, points = CourseDirectory(config=course_config(name, assignments)), list[Any]()
+    with Gradebook(course.db_url) as gradebook, suppress(MissingEntry):
+        grades = gradebook.find_submission_notebook(name, name, student).grades
+        points = sorted((grade.name, grade.auto_score) for grade in grades)
+    folders = [assignments / "submitted" / student / name, find_set(name, assignments)]
     files = [path for folder in folders for path in sorted(folder.iterdir())]
-    facts = [(path.name, path.lstat()) for path in files]
-    return [[name, about.st_size, about.st_mtime_ns] for name, about in facts]
+    packages = [*rbcourse.__path__, *rbclassroom.__path__]
+    files += [path for folder in packages for path in sorted(Path(folder).rglob("*.py"))]
+    files += [assignments / "nbgrader_config.py"]
+    facts = [(path.name, path.read_bytes()) for path in files if path.is_file()]
+    return hashlib.sha256(repr((boxed, points, facts)).encode()).hexdigest()
 
 
-def _grade_set(
-    jobs: list[Job], progress: _Progress, assignments: Path, rows: dict[Job, Row]
-) -> None:
+def _grade_set(jobs: list[Job], assignments: Path, rows: dict[Job, Row], boxed: bool) -> None:
     """Grade the submissions of a set in parallel; print and store their rows.
 
     After Ctrl-C, the submissions at work are ended, and lose their earlier points and their
     feedback, because a part of the new ones may be stored.
     """
-    name, boxed = jobs[0][0], progress.boxed
+    name, todo = jobs[0][0], [*jobs]
     course = CourseDirectory(config=course_config(name, assignments))
-    todo = [job for job in jobs if job not in progress.results]
     works: dict[Future[list[str]], tuple[Job, ProcessPoolExecutor]] = {}
     folder = Path(tempfile.mkdtemp())  # for all kernels
     worker = partial(ProcessPoolExecutor, 1, get_context("spawn"), _begin, (MEMORY, str(folder)))
     with Gradebook(course.db_url) as gradebook:
         known = _points(gradebook)
-        for job in (job for job in jobs if job in progress.results):
-            rows[job] = _row(gradebook, job, progress.results[job], boxed)
-            _print_row(rows[job])
     with ExitStack() as stack:
         stack.callback(sandbox.delete, folder)
         free = [stack.enter_context(worker()) for _ in range(WORKERS)]
@@ -233,8 +211,6 @@ def _grade_set(
                         when = f"during the grading of {' and '.join(sorted(at_work))}"
                         where = f"The earlier points are in gradebook.before-{name}.db."
                         raise ValueError(f"The points of {others[0]} changed {when}. {where}")
-                    if isinstance(result, list):
-                        progress.keep(job, result)
                     rows[job] = row
                     _print_row(row)
         except KeyboardInterrupt:
@@ -319,7 +295,7 @@ def _begin(memory: int, folder: str) -> None:
 
 
 def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
-    """Grade one submission; return remarks on it."""
+    """Grade one submission, unless nothing has changed, and write its page; return remarks."""
     config = course_config(name, folder)
     config.BoxedExecute.boxed = boxed
     config.CourseDirectory.student_id = student
@@ -327,25 +303,42 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
     alarm(300 + 2 * config.BoxedExecute.get("seconds", 600))  # it ends this process
     try:
         graded = folder / "autograded" / student / name / f"{name}.ipynb"
-        before = _words(graded)
+        job, stored = (name, student), graded.with_name(RUN)
         if glob.escape(student) != student:  # nbgrader reads this name as a pattern
             raise Refused("the name of the folder contains [, * or ?; rename the folder")
         given = {path.name for path in find_set(name, folder).iterdir()}
         check_submission(folder / "submitted" / student / name, name, given)
-        done = run_step(Autograde, config)
-        if not done["success"]:
-            raise Refused(last_line(done))
-        remarks: list[str] = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
-        changed = (key for key, words in _words(graded).items() if words != before.get(key, words))
-        remarks += [
-            f"the answer {key} differs from the one that was graded before" for key in changed
-        ]
+        state, remarks = _graded(stored)
+        if state != _state(job, folder, boxed):
+            remarks = _autograde(graded, config)
         done = run_step(GenerateFeedback, config)
         if not done["success"]:
-            remarks.append(f"no feedback was written: {last_line(done)}")
+            return [*remarks, f"no feedback was written: {last_line(done)}"]
+        run = nbformat.read(stored, as_version=4)
+        run.metadata.graded = [_state(job, folder, boxed), remarks]
+        replace_file(stored, nbformat.writes(run).encode())
         return remarks
     finally:
         alarm(0)
+
+
+def _graded(stored: Path) -> tuple[str, list[str]]:
+    """Return the state of a submission when it was graded, and the remarks on it."""
+    run = nbformat.read(stored, as_version=4) if stored.exists() else NotebookNode(metadata={})
+    state, remarks = run.metadata.get("graded", ("", []))
+    return state, remarks
+
+
+def _autograde(graded: Path, config: Config) -> list[str]:
+    before = _words(graded)
+    done = run_step(Autograde, config)
+    if not done["success"]:
+        raise Refused(last_line(done))
+    remarks: list[str] = nbformat.read(graded, as_version=4).metadata.get("remarks", [])
+    changed = (key for key, words in _words(graded).items() if words != before.get(key, words))
+    return remarks + [
+        f"the answer {x} differs from the one that was graded before" for x in changed
+    ]
 
 
 def _words(path: Path) -> dict[str, str]:

@@ -439,5 +439,33 @@ def test_after_ctrl_c_the_submissions_at_work_count_as_not_graded(tmp_path, cour
     assert grade(["ps0"], course.folder, without_box=True)
     assert course.graded("good one").stat().st_mtime_ns == before
     assert (course.rows()["good one"]["total"], course.rows()["tampers"]["total"]) == ("4", "3")
-    # the table is complete, so another run begins again
-    assert not (course.folder / "grading.json").exists()
+
+
+def test_only_changed_submissions_run_again(tmp_path, template):
+    """Marks given by hand change the table and the page without another run."""
+    course = Class(tmp_path, template)
+    for student in ("ann", "bob"):
+        course.submit(student, half="import uuid\nhalf = 0.5\nprint(f'run {uuid.uuid4()}')")
+    grade(["ps0"], course.folder, without_box=True)
+    runs = {who: re.findall("run [0-9a-f-]{36}", course.page(who)) for who in ("ann", "bob")}
+    with course.gradebook() as gradebook:
+        gradebook.find_grade("words-answer", "ps0", "ps0", "ann").manual_score = 2.5
+        gradebook.find_comment("words-answer", "ps0", "ps0", "ann").manual_comment = "Well put."
+        gradebook.db.commit()
+    shutil.rmtree(course.graded("bob").parent)
+    graded = course.graded("ann").stat().st_mtime_ns
+    grade(["ps0"], course.folder, without_box=True)
+    assert course.graded("ann").stat().st_mtime_ns == graded
+    assert runs["ann"] == re.findall("run [0-9a-f-]{36}", course.page("ann")) != []
+    assert runs["bob"] != re.findall("run [0-9a-f-]{36}", course.page("bob"))
+    assert (course.rows()["ann"]["total"], course.rows()["bob"]["total"]) == ("5.5", "3")
+    said = " ".join(course.feedback("ann").split())
+    assert "5.5 of 6 points. Right" in said
+    assert "Your lecturer: Well put." in said
+    pages = course.folder / "feedback" / "ann" / "ps0"
+    assert [path.name for path in pages.iterdir()] == ["ps0.html"]
+    with course.gradebook() as gradebook:  # an earlier gradebook may have other points
+        before = grading._state(("ps0", "ann"), course.folder, False)
+        gradebook.find_grade("square-test", "ps0", "ps0", "ann").auto_score = 0
+        gradebook.db.commit()
+    assert grading._state(("ps0", "ann"), course.folder, False) != before
