@@ -307,6 +307,8 @@ def _take(best: File, place: Path) -> Row:
     date = best.about["date"]
     target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
     why = f"{place.parent.name}, {place.name}" + f": {best.why}" * bool(best.why)
+    if unsure := best.about["unsure"]:
+        why += f" (or is “{unsure}” the student?)"
     if target.exists():
         # keep a file without a stamp, because it was not collected
         old = stamp.read_text(encoding="utf-8").strip() if stamp.exists() else "later"

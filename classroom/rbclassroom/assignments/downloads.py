@@ -147,12 +147,16 @@ def find_owners(files: list[File]) -> None:
     found = [file.of_set for file in files]
     levels = {at: k for at, k in _levels(notebooks, 0, found).items() if k != UNKNOWN}
     above = {parts[: levels[at]] for at, parts in notebooks.items() if at in levels}
+    alone = len({parts[: levels[at] + 1] for at, parts in notebooks.items() if at in levels}) == 1
     for at, parts in loose.items():
         first = next((k for k in range(len(parts) - 1) if parts[:k] in above), 0)
         level = levels.get(at, first)
         if parts[:level] in above and (at in levels or files[at].kind):
             name, folder = parts[level].removesuffix(".zip"), "/".join(parts[: level + 1])
             about = {"name": name, "folder": folder, "file": "/".join(parts[level + 1 :])}
+            below = parts[level + 1 : -1][:1] if alone and not PERSON.search(name) else ()
+            for inner in {*below} - GENERIC.union(found):
+                about["unsure"] = inner  # a single folder may be around that of the student
             files[at].about = _about(about, files[at], level)
 
 
@@ -226,7 +230,7 @@ def _is_class(above: tuple[str, ...], siblings: set[str]) -> bool:
 
 def _about(found: dict[str, Any], file: File, at: int) -> dict[str, str]:
     """Complete the data of a student; the date is that of the upload, not of a file in a zip."""
-    about = dict.fromkeys(("name", "id", "folder", "late", "number", "file", "exact"), "")
+    about = dict.fromkeys(("name", "id", "folder", "unsure", "late", "number", "file", "exact"), "")
     about |= {key: value or "" for key, value in found.items()}
     when = written(next(date for date in file.dates[at:] if date))
     for form in DATES:

@@ -403,6 +403,20 @@ def test_the_level_of_the_students_is_found(course, paths, wanted):
     assert sorted(files(course)) == [f"{student}/ps1" for student in wanted.split()]
 
 
+@pytest.mark.parametrize(
+    ("path", "wanted"),
+    [
+        ("extra/wes/ps1.ipynb", "extra, ps1 (or is “wes” the student?)"),
+        ("extra/Wes Wu/ps1.ipynb", "wes_wu, ps1"),
+        ("Wes Wu/version/ps1.ipynb", "wes_wu, ps1"),
+        ("wes/ps1/work/ps1.ipynb", "wes, ps1"),
+    ],
+)
+def test_a_row_says_if_the_folder_of_the_student_is_uncertain(course, path, wanted):
+    rows = collected(course, {moodle("A_1"): answered(course), path: answered(course)})
+    assert (path, wanted) in of("collected", rows)
+
+
 def test_folders_are_named_after_ids_or_names_of_the_roster(course):
     (course / "students.csv").write_text("id,first_name,last_name\ns1,Al,Li\ns2,Bo,Ek\ns3,Cy,Ax\n")
     entries = {f"{name}/ps1.ipynb": answered(course) for name in ("s1", "Ek, Bo", "cy ax")}
