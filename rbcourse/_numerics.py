@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
-CACHED = 1024  # vectors that are converted together
+CACHED = 4096  # vectors that are converted together; with 1,024, `exp_so3` takes 1.3 times as long
 BLOCK = 5000  # matrices that are computed together, which bounds the memory for workspaces
 Item = TypeVar("Item")
 
@@ -60,17 +60,18 @@ def blocks(count: int, size: int = BLOCK) -> Iterator[slice]:
         yield slice(start, min(start + size, count))
 
 
-def in_blocks(function: Callable[[Array], Array], x: Array) -> Array:
+def in_blocks(function: Callable[[Array], Array], x: Array, size: int) -> Array:
     """Return function(x) for vectors x of shape (..., n), in blocks whose workspaces fit the cache.
 
-    For 100,000 rotation vectors, `exp_so3` takes a third to a sixth of the time.
+    The results are square matrices of the given size.
     """
     count = math.prod(x.shape[:-1])
     if count <= CACHED:
         return function(x)
-    flat = x.reshape(count, -1)
-    done = np.concatenate([function(flat[part]) for part in blocks(count, CACHED)])
-    return done.reshape(*x.shape[:-1], *done.shape[1:])
+    flat, done = x.reshape(count, -1), np.empty((count, size, size))
+    for part in blocks(count, CACHED):
+        done[part] = function(flat[part])
+    return done.reshape(*x.shape[:-1], size, size)
 
 
 def reported(work: str, items: Sequence[Item]) -> Iterator[Item]:

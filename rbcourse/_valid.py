@@ -60,7 +60,7 @@ def as_unit_quaternions(name: str, value: ArrayLike) -> Array:
     """Return quaternions of norm 1, shape (..., 4)."""
     q = as_finite(name, value, 4)
     with np.errstate(over="ignore"):
-        norm = np.linalg.norm(q, axis=-1)
+        norm = np.sqrt(np.vecdot(q, q))
     deviation = np.abs(norm - 1)
     wrong = deviation > REMOVED
     if wrong.any():

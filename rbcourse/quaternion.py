@@ -80,7 +80,7 @@ def matrix_from_quaternion(q: ArrayLike) -> Array:
            [ 0.,  0.,  1.]])
     """
     q = as_unit_quaternions("q", q)
-    return in_blocks(lambda some: matrix(np.moveaxis(some, -1, 0)), q)
+    return in_blocks(lambda some: matrix(np.moveaxis(some, -1, 0)), q, 3)
 
 
 @described_by(__doc__, returns="ndarray, shape (..., 4)")

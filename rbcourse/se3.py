@@ -199,7 +199,7 @@ def exp_se3(S: ArrayLike) -> Array:
            [ 0.   ,  0.   ,  1.   ,  3.   ],
            [ 0.   ,  0.   ,  0.   ,  1.   ]])
     """
-    return in_blocks(_exp, as_finite("S", S, 6))
+    return in_blocks(_exp, as_finite("S", S, 6), 4)
 
 
 def _exp(S: Array) -> Array:

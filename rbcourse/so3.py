@@ -92,12 +92,12 @@ def exp_so3(w: ArrayLike) -> Array:
            [ 1.,  0.,  0.],
            [ 0.,  0.,  1.]])
     """
-    return in_blocks(_exp, as_finite("w", w, 3))
+    return in_blocks(_exp, as_finite("w", w, 3), 3)
 
 
 def _exp(w: Array) -> Array:
-    N, angle = _hat_and_angle(w)
-    return np.eye(3) + np.sin(angle) * N + 2 * np.sin(angle / 2) ** 2 * N @ N
+    n, a = axis_and_angle(w)
+    return _by_powers(n, np.sin(a), 2 * np.sin(a / 2) ** 2)
 
 
 @described_by(__doc__, returns="ndarray, shape (..., 3)")
@@ -153,8 +153,8 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     >>> right_jacobian_so3([0, 0, 1]) @ [0, 0, 5]  # a vector along the axis is unchanged
     array([0., 0., 5.])
     """
-    N, angle = _hat_and_angle(as_finite("w", w, 3))
-    return np.eye(3) - np.sin(angle / 2) * sinc(angle / 2) * N + (1 - sinc(angle)) * N @ N
+    n, a = axis_and_angle(as_finite("w", w, 3))
+    return _by_powers(n, -np.sin(a / 2) * sinc(a / 2), 1 - sinc(a))
 
 
 @described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
@@ -172,12 +172,20 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     >>> bool(np.allclose(right_jacobian_inverse_so3(w) @ right_jacobian_so3(w), np.eye(3)))
     True
     """
-    w = as_finite("w", w, 3)
-    N, angle = _hat_and_angle(w)
-    return np.eye(3) + hat(w) / 2 + (1 - np.cos(angle / 2) / sinc(angle / 2)) * N @ N
+    n, a = axis_and_angle(as_finite("w", w, 3))
+    return _by_powers(n, a / 2, 1 - np.cos(a / 2) / sinc(a / 2))
 
 
-def _hat_and_angle(w: Array) -> tuple[Array, Array]:
-    """Return n̂ and a for w = a n; a has two trailing axes of length 1."""
-    axis, angle = axis_and_angle(w)
-    return hat(axis), angle[..., None]
+def _by_powers(n: Array, b: Array, c: Array) -> Array:
+    """Return I + b n̂ + c n̂², shape (..., 3, 3); b and c have the shape (..., 1)."""
+    (x, y, z), (b,), (c,) = n.T, b.T, c.T  # in these and in R.T, the batch axes are reversed
+    bx, by, bz = b * x, b * y, b * z
+    cx, cy, cz = c * x, c * y, c * z
+    R = np.empty((*n.shape, 3))
+    R.T[...] = (  # the columns of R
+        (1 - cy * y - cz * z, cx * y + bz, cx * z - by),
+        (cx * y - bz, 1 - cx * x - cz * z, cy * z + bx),
+        (cx * z + by, cy * z - bx, 1 - cx * x - cy * y),
+    )
+    R += 0.0  # changes −0 to 0
+    return R

@@ -1,3 +1,5 @@
+import tracemalloc
+
 import awkward
 import numpy as np
 import oracles
@@ -101,6 +103,21 @@ def test_exp_of_huge_vectors_is_a_rotation_until_their_norm_overflows():
         w = np.outer([0, 1.7e308], np.ones(6 if function is rb.exp_se3 else 3))
         with pytest.raises(ValueError, match=r"^norm of w\[1\] is inf"):
             function(w)
+
+
+@pytest.mark.parametrize(
+    ("function", "size"),
+    [(rb.exp_so3, 3), (rb.exp_se3, 6), (rb.quaternion.matrix_from_quaternion, 4)],
+)
+def test_a_large_stack_equals_its_parts_and_needs_memory_for_one_array_of_results(function, size):
+    x = np.random.default_rng(5).normal(size=(2, 50_000, size))
+    x /= np.linalg.norm(x, axis=-1, keepdims=True)
+    tracemalloc.start()
+    found = function(x)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1.5 * (x.nbytes + found.nbytes)
+    assert np.abs(found[1, -9:] - function(x[1, -9:])).max() < 4 * EPS
 
 
 @pytest.mark.source("BK 2.5", "errata 14")
