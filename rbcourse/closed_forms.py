@@ -2,8 +2,7 @@
 
 Each function takes two rotations and two angular velocities, or two poses and two twists; for
 poses, the origin moves on the cubic with the same boundary conditions. The projected cubic is
-`rbcourse.projected_cubic`. To add a closed form, write a function with the same arguments and add
-it to `FORMS`: the tests, the surveys and the explorers use this dict.
+`rbcourse.projected_cubic`. CONTRIBUTING.md lists the steps that add a closed form.
 """
 
 from collections.abc import Callable

@@ -229,7 +229,8 @@ def exponential_quintic(
     The quintic has σ(0) = 0, σ(1) = log_so3(R0ᵀ R1) and the derivatives that give w and w' at both
     ends. For small excursions, the curve is near-optimal for minimum jerk (see
     docs/near_optimal.md). From rest to rest, it is the optimum (`minimum_jerk`). The singular set
-    is that of `exponential_cubic`, and the curve does not depend on the choice of frames.
+    is that of `exponential_cubic`. The curve does not depend on the choice of frames, but the
+    reversed ends do not give the reversed curve.
     Source: beyond BK 8; the cubic is in BK 1, its reference 13.
 
     Examples
