@@ -29,7 +29,7 @@ def wandering(t, turn=0.1, noise=0.02, seed=3):
     return R, R @ rb.exp_so3(noise * rng.normal(size=(len(t), 3)))
 
 
-TRUE, NOISY = wandering(T)
+NOISY = wandering(T)[1]
 PLACES = np.stack([np.sin(T / 6), np.cos(T / 5), 0.1 * T], axis=-1)
 POSES = rb.pose_from_components(NOISY, PLACES + 0.01 * RNG.normal(size=(40, 3)))
 

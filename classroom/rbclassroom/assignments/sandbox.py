@@ -52,7 +52,9 @@ def missing() -> str:
             subprocess.run(words, env=environment(Path(folder)), check=True, **settings)
         except subprocess.CalledProcessError as error:
             said = (error.stderr.strip() or f"its exit code is {error.returncode}").splitlines()[-1]
-            return f"bubblewrap does not work here ({said}); user namespaces have to be allowed"
+            if said.startswith("bwrap: "):
+                return f"bubblewrap does not work here ({said}); user namespaces have to be allowed"
+            return f"the sandbox does not work here ({said})"
         except OSError as error:  # setpriv or another program of util-linux is not there
             return f"{error.filename} does not work here ({error.strerror})"
     return ""

@@ -334,7 +334,13 @@ def test_nbgrader_commands_use_the_same_configuration():
     assert read_config(ROOT / "notebooks" / "assignments") == wanted
 
 
-@pytest.fixture(params=["no bubblewrap", "bubblewrap does not work"])
+FAILURES = {  # the last line of the output, and the reason
+    "bwrap: No permissions": r"bubblewrap does not work here \(.*\); user namespaces",
+    "No module named 'a'": r"the sandbox does not work here \(No module named 'a'\)(?!; user)",
+}
+
+
+@pytest.fixture(params=["no bubblewrap", *FAILURES])
 def unboxed(request, tmp_path, monkeypatch):
     """Change the search path so that there is no sandbox; return the expected reason."""
     programs, path, why = tmp_path / "programs", os.environ["PATH"], r"bubblewrap is not installed "
@@ -345,9 +351,9 @@ def unboxed(request, tmp_path, monkeypatch):
                 (programs / name).symlink_to(there)
         path = ""
     else:
-        (programs / "bwrap").write_text("#!/bin/sh\necho No permissions >&2\nexit 1\n")
+        (programs / "bwrap").write_text(f'#!/bin/sh\necho "{request.param}" >&2\nexit 1\n')
         (programs / "bwrap").chmod(0o755)
-        why = r"bubblewrap does not work here \(No permissions\)"
+        why = FAILURES[request.param]
     monkeypatch.setenv("PATH", f"{programs}{os.pathsep}{path}")
     sandbox.missing.cache_clear()
     yield why if sys.platform == "linux" else "it needs Linux"

@@ -1,6 +1,9 @@
-"""Sandboxed processes end after their time limit, or when the grading process ends."""
+"""Sandboxed processes have no network, and end with their time or with the grading process."""
 
 import os
+import re
+import socket
+import subprocess
 import sys
 import tempfile
 import time
@@ -9,9 +12,21 @@ from pathlib import Path
 import psutil
 from tiny_class import Class
 
+from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.grade import grade
 
 ROOT = Path(__file__).parents[3]
+
+
+def test_a_process_in_the_sandbox_cannot_connect_to_a_server_outside(tmp_path):
+    sandbox.prepare(tmp_path)
+    code = "import socket, sys; socket.create_connection(('127.0.0.1', int(sys.argv[1])), 5)"
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        words = [sys.executable, "-c", code, str(server.getsockname()[1])]
+        subprocess.run(words, check=True)
+        boxed, environment = [*sandbox.box(tmp_path, 60), *words], sandbox.environment(tmp_path)
+        done = subprocess.run(boxed, env=environment, stderr=subprocess.PIPE, text=True)
+    assert re.search(r"^ConnectionRefusedError|Network is unreachable", done.stderr, re.MULTILINE)
 
 
 def test_a_submission_that_takes_too_long_is_ended(tmp_path, template, monkeypatch):

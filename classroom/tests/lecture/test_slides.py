@@ -179,14 +179,14 @@ VERDICT = """**B** It is even.
 After."""
 
 
-def poll(question="Which?", verdict=VERDICT):
+def poll():
     options = "".join(f"- **{letter}** · option {letter}\n" for letter in "ABCD")
     return (
         text("## 1 · One"),
-        text(f"### Poll 1\n\n{question}\n\n{options}"),
+        text(f"### Poll 1\n\nWhich?\n\n{options}"),
         text("### Answer to poll 1"),
         text("It was measured.", "Evidence."),
-        text("**B** it is.\n\n- **A** is odd, and so on.", verdict),
+        text("**B** it is.\n\n- **A** is odd, and so on.", VERDICT),
     )
 
 

@@ -57,7 +57,7 @@ def test_the_lock_file_lists_all_files_that_the_pages_load():
     assert all(len(digest) == 64 for digest in engine.FILES.values())
 
 
-def test_a_site_includes_the_code_of_the_course(monkeypatch, tmp_path):
+def test_a_site_includes_the_code_of_the_course(tmp_path):
     (tmp_path / "have").mkdir()
     for name in engine.FILES:
         (tmp_path / "have" / name).write_bytes(name.encode())
