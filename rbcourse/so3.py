@@ -97,7 +97,7 @@ def exp_so3(w: ArrayLike) -> Array:
 
 def _exp(w: Array) -> Array:
     n, a = axis_and_angle(w)
-    return _by_powers(n, np.sin(a), 2 * np.sin(a / 2) ** 2)
+    return _quadratic(np.sin(a) * n, n, 2 * np.sin(a / 2) ** 2)
 
 
 @described_by(__doc__, returns="ndarray, shape (..., 3)")
@@ -154,7 +154,7 @@ def right_jacobian_so3(w: ArrayLike) -> Array:
     array([0., 0., 5.])
     """
     n, a = axis_and_angle(as_finite("w", w, 3))
-    return _by_powers(n, -np.sin(a / 2) * sinc(a / 2), 1 - sinc(a))
+    return _quadratic(-np.sin(a / 2) * sinc(a / 2) * n, n, 1 - sinc(a))
 
 
 @described_by(__doc__, returns="ndarray, shape (..., 3, 3)")
@@ -172,20 +172,20 @@ def right_jacobian_inverse_so3(w: ArrayLike) -> Array:
     >>> bool(np.allclose(right_jacobian_inverse_so3(w) @ right_jacobian_so3(w), np.eye(3)))
     True
     """
-    n, a = axis_and_angle(as_finite("w", w, 3))
-    return _by_powers(n, a / 2, 1 - np.cos(a / 2) / sinc(a / 2))
+    w = as_finite("w", w, 3)
+    n, a = axis_and_angle(w)
+    return _quadratic(w / 2, n, 1 - np.cos(a / 2) / sinc(a / 2))
 
 
-def _by_powers(n: Array, b: Array, c: Array) -> Array:
-    """Return I + b n̂ + c n̂², shape (..., 3, 3); b and c have the shape (..., 1)."""
-    (x, y, z), (b,), (c,) = n.T, b.T, c.T  # in these and in R.T, the batch axes are reversed
-    bx, by, bz = b * x, b * y, b * z
+def _quadratic(u: Array, n: Array, c: Array) -> Array:
+    """Return I + û + c n̂², shape (..., 3, 3), for vectors u and n; c has the shape (..., 1)."""
+    (u, v, w), (x, y, z), (c,) = u.T, n.T, c.T  # in these and in R.T, the batch axes are reversed
     cx, cy, cz = c * x, c * y, c * z
     R = np.empty((*n.shape, 3))
     R.T[...] = (  # the columns of R
-        (1 - cy * y - cz * z, cx * y + bz, cx * z - by),
-        (cx * y - bz, 1 - cx * x - cz * z, cy * z + bx),
-        (cx * z + by, cy * z - bx, 1 - cx * x - cy * y),
+        (1 - (cz * z + cy * y), cx * y + w, cx * z - v),
+        (cy * x - w, 1 - (cz * z + cx * x), cy * z + u),
+        (cz * x + v, cz * y - u, 1 - (cy * y + cx * x)),
     )
     R += 0.0  # changes −0 to 0
     return R
