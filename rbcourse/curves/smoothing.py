@@ -156,8 +156,8 @@ def smoothing_spline(
     turn = c.period / (2 * np.pi) * np.sqrt(np.mean(np.sum(c.velocities**2, axis=1)))
     if turn > _DOMAIN:
         warnings.warn(
-            f"the body turns by {turn:.3g} rad in the time period/2π, and beyond {_DOMAIN:g} rad the "
-            "closed form is not near the optimum; choose a shorter period, or "
+            f"the body turns by {turn:.3g} rad in the time period/2π, and beyond {_DOMAIN:g} rad "
+            "the closed form is not near the optimum; choose a shorter period, or "
             "rbcourse.optimum.minimum_acceleration_smoothing",
             RuntimeWarning,
             stacklevel=2,
@@ -423,13 +423,13 @@ class Smoother:
 
         In gaps of 1, 1.5 and 2 periods, the largest error is 3, 5 and 30 times the usual error.
         """
-        steps = np.diff(self.knots)
+        steps, period = np.diff(self.knots), np.min(periods)
         i = np.argmax(steps)
-        if steps[i] > max(np.min(periods), _GAP * usual_step(steps)):
+        if steps[i] > max(period, _GAP * usual_step(steps)):
             warnings.warn(
-                f"times: no pose between {self.knots[i]:.13g} and {self.knots[i + 1]:.13g}, which is "
-                f"longer than the period {np.min(periods):.3g}, so the motion there is not known; "
-                "smooth both sides apart",
+                f"times: no pose between {self.knots[i]:.13g} and {self.knots[i + 1]:.13g}, longer "
+                f"than the period {period:.3g}, so the motion there is not known; smooth both "
+                "sides apart",
                 RuntimeWarning,
                 stacklevel=3,
             )
