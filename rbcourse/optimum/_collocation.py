@@ -27,8 +27,8 @@ from rbcourse._polynomials import along, grid, interpolation, primitives, tails
 from rbcourse.curves.functionals import Functional
 from rbcourse.so3 import hat, vee
 
-TOGETHER = 64  # problems solved together, which bounds the memory: 80 MB a matrix on 129 nodes
-NODES = 17, 25, 33, 49, 65, 97, 129  # numbers of nodes, one after the other
+TOGETHER = 64  # problems solved together, which bounds the memory: 120 MB a matrix on 161 nodes
+NODES = 17, 25, 33, 49, 65, 97, 129, 161  # one after the other [to 129: 6 of 300 rods missed]
 MOST_INTERVALS = 256  # between the nodes of a ball, whose linear systems do not grow
 STEPS = 25  # on one set of nodes; then the problem has failed
 LONGEST_STEP = 0.5  # rad: no step turns a node by more than this

@@ -62,11 +62,12 @@ class Thresholds:
 
     In brackets: another value, and how many optima it misses of 2,880 balls, of 900 bodies
     (acceleration and torque, a third of them rods), or of 900 problems of the jerk, at random ends.
+    "Of rods" means: of 600 rods with the moments 1, 6 to 10 and up to 1 more (torque).
     """
 
     nodes = 17  # nodes of starting curves, and of the linear systems of a ball [13: 10]
-    nodes_for_rods = 25  # [17: 7]
-    rod = 3.0  # a body whose moments have a larger ratio is a rod [6: 1]
+    nodes_for_rods = 33  # [25: 15 of rods, instead of 2]
+    rod = 2.3  # a body is a rod if its middle moment has a larger ratio to the least one [3: 1]
     nodes_for_spin = 8  # added to the nodes of starting curves before spin is added [0: 6]
     nodes_for_jerk = 29  # the jerk needs more, since it has higher derivatives [21: 0, 17: 1]
     more_nodes = 33, 65  # for fast problems, and if a start costs less [always 17: 135]
@@ -79,15 +80,15 @@ class Thresholds:
     flat = 0.1  # if w deviates less from its axis, as a share, bent curves are tried [see `bend`]
     bend = 0.5  # rad: size of the bend [0.1, 1: 0; no bend: 1 of 600 bodies near an axis]
     refined = 3.0  # curves up to this cost ratio are lowered on more nodes [1.5: 0]
-    spun = 3.0, 1.15  # spin is added twice, to curves up to these cost ratios [once: 2]
+    spun = 3.0, 1.15, 1.001  # spin is added thrice, up to these cost ratios [twice: 2 of 300 rods]
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost [1: 1]
     needle = 300.0  # beyond this ratio of moments, the work is bounded [36 rods: at most 3 s each]
     most_of_needles = 16  # promising curves [no bound: 3 of 6 rods of ratio 1e4 take over 20 s]
     most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
-    promising = 1.3  # curves above this cost ratio are dropped before more steps [1.1: 1]
+    promising = 1.2  # curves above this cost ratio are dropped before more steps [1.1: 1]
     starts = Steps(40, 5e-4)  # Gauss–Newton steps for starting curves [20 or 5e-3: 0]
     starts_of_bodies = Steps(20, 2e-3)  # for bodies; many curves are lowered again [10, 1e-2: 0]
-    on_more_nodes = Steps(60, 1e-4)  # for curves of bodies, if spin is added [20, 1e-3: 2]
+    on_more_nodes = Steps(30, 5e-4)  # for curves of bodies, if spin is added [20, 1e-3: 2]
     brief = Steps(4, 5e-4)  # for curves with more spin, before most are dropped [2: 4]
     bent = Steps(40, 1e-6)  # for bent curves, which may be near a saddle [10, 1e-4: 0]
     last = Steps(200, 0.0)  # used if the other steps do not suffice [40: 0]
@@ -396,7 +397,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     is_ball = deviation.max(axis=(1, 2)) < 8 * EPS
     balls = np.flatnonzero(is_ball)
     moments = np.linalg.eigvalsh(functional.G)
-    is_rod = moments[:, 2] > LIMITS.rod * moments[:, 0]
+    is_rod = moments[:, 1] > LIMITS.rod * moments[:, 0]
 
     def start(problems: Numbers, n: int) -> Curves:
         some = ends.take(problems)
