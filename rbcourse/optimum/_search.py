@@ -68,7 +68,8 @@ class Thresholds:
     nodes = 17  # nodes of starting curves, and of the linear systems of a ball [13: 10]
     nodes_for_rods = 33  # [25: 15 of rods, instead of 2]
     rod = 2.3  # a body is a rod if its middle moment has a larger ratio to the least one [3: 1]
-    nodes_for_spin = 8  # added to the nodes of starting curves before spin is added [0: 6]
+    thin = 20.0  # beyond this ratio of moments, `nodes` suffice [33: at 100, 4 of 12 more fail]
+    nodes_for_spin = 16  # added to the nodes before spin is added [8: 7 of 1,200 rods, not 0]
     nodes_for_jerk = 29  # the jerk needs more, since it has higher derivatives [21: 0, 17: 1]
     more_nodes = 33, 65  # for fast problems, and if a start costs less [always 17: 135]
     fast = 24.0, 80.0  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used [48, 160: 7]
@@ -82,14 +83,14 @@ class Thresholds:
     refined = 3.0  # curves up to this cost ratio are lowered on more nodes [1.5: 0]
     spun = 3.0, 1.15, 1.001  # spin is added thrice, up to these cost ratios [twice: 2 of 300 rods]
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost [1: 1]
-    needle = 300.0  # beyond this ratio of moments, the work is bounded [36 rods: at most 3 s each]
+    needle = 3e4  # beyond this ratio of moments, the work is bounded [1e6: over 100 s, now 3 s]
     most_of_needles = 16  # promising curves [no bound: 3 of 6 rods of ratio 1e4 take over 20 s]
     most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
-    promising = 1.2  # curves above this cost ratio are dropped before more steps [1.1: 1]
+    promising = 1.1  # curves above this cost ratio are dropped before more steps [1.3: 0]
     starts = Steps(40, 5e-4)  # Gauss–Newton steps for starting curves [20 or 5e-3: 0]
     starts_of_bodies = Steps(20, 2e-3)  # for bodies; many curves are lowered again [10, 1e-2: 0]
     on_more_nodes = Steps(30, 5e-4)  # for curves of bodies, if spin is added [20, 1e-3: 2]
-    brief = Steps(4, 5e-4)  # for curves with more spin, before most are dropped [2: 4]
+    brief = Steps(10, 5e-4)  # for curves with more spin, before most are dropped [4: 2 of rods]
     bent = Steps(40, 1e-6)  # for bent curves, which may be near a saddle [10, 1e-4: 0]
     last = Steps(200, 0.0)  # used if the other steps do not suffice [40: 0]
 
@@ -398,6 +399,7 @@ def body(given: Ends, G: Array, *, of_torque: bool) -> Task:
     balls = np.flatnonzero(is_ball)
     moments = np.linalg.eigvalsh(functional.G)
     is_rod = moments[:, 1] > LIMITS.rod * moments[:, 0]
+    is_rod &= moments[:, 2] < LIMITS.thin * moments[:, 0]
 
     def start(problems: Numbers, n: int) -> Curves:
         some = ends.take(problems)

@@ -74,7 +74,7 @@ def minimum_acceleration(
     short way or the long way. The result is stationary, and ``certified`` tells whether it is
     proven to be a local minimum. It is not proven that no other curve costs less, even if
     ``converged`` is True, and for very thin rods, the method may not converge (docs/near_optimal.md
-    has tests). If a body's moments have a ratio above 300, fewer curves are tried. If the end
+    has tests). If a body's moments have a ratio above 3e4, fewer curves are tried. If the end
     velocities are along the geodesic, the optimum is R0 exp(σ̂ p(t)), where p is a cubic and σ is a
     logarithm of R0ᵀR1 (not always the shortest logarithm). For poses, the mass changes the cost of
     the motion, but not the motion. `closed_forms.corrected_bezier` and `projected_cubic` are
