@@ -217,8 +217,7 @@ def test_a_second_visit_uses_stored_files(context, address):
 
 def test_pages_opened_as_files_explain_what_is_missing(page, book):
     page.goto((book / "problems/ps1.html").as_uri())
-    page.evaluate("MathJax.startup.promise")  # formulas move the buttons
-    page.get_by_role("button", name="Check").first.click()
+    page.get_by_role("button", name="Check").first.dispatch_event("click")  # formulas move it
     expect(page.locator(".outputs .error").first).to_contain_text("web server")
     page.goto((book / "lessons/04_nearest_rotation.html").as_uri())
     page.locator(".try:visible").first.click()
