@@ -83,7 +83,7 @@ class Thresholds:
     refined = 3.0  # curves up to this cost ratio are lowered on more nodes [1.5: 0]
     spun = 3.0, 1.15, 1.001  # spin is added thrice, up to these cost ratios [twice: 2 of 300 rods]
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost [1: 1]
-    needle = 3e4  # beyond this ratio of moments, the work is bounded [1e6: over 100 s, now 3 s]
+    needle = 3e4  # beyond this ratio of moments, the work is bounded [no bound: 100 s at 1e6]
     most_of_needles = 16  # promising curves [no bound: 3 of 6 rods of ratio 1e4 take over 20 s]
     most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
     promising = 1.1  # curves above this cost ratio are dropped before more steps [1.3: 0]
