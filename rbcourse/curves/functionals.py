@@ -18,7 +18,7 @@ from typing import Any, Self, TypeAlias
 
 import numpy as np
 
-from rbcourse._numerics import Array, cross, matvec
+from rbcourse._numerics import Array, cross
 from rbcourse.so3 import hat
 
 Functional: TypeAlias = "BallAcceleration | Effort | Jerk"
@@ -123,44 +123,48 @@ class Effort:
 
     def torque(self, w: Array, a: Array) -> Array:
         """Return the torque τ = G w' + w × G w of the scaled inertia G."""
-        G = self.G[:, None]
-        return matvec(G, a) + cross(w, matvec(G, w))
+        return _times(self.G, a) + cross(w, _times(self.G, w))
 
     def deviation(self, w: Array, a: Array) -> Array:
         """Return u, a square root of M times the torque."""
-        return matvec(self.root[:, None], self.torque(w, a))
+        return _times(self.root, self.torque(w, a))
 
     def deviation_by(self, w: Array, a: Array) -> list[Array]:
         """Return the derivatives of the deviation with respect to w and w'."""
         G, root = self.G[:, None], self.root[:, None]
-        T0 = hat(w) @ G - hat(matvec(G, w))
+        T0 = hat(w) @ G - hat(_times(self.G, w))
         return [root @ T0, np.broadcast_to(root @ G, T0.shape)]
 
     def momenta(self, w: Array, a: Array) -> tuple[Array, list[Array]]:
         """Return 2 G M τ and its derivatives."""
-        pull = 2 * (self.root @ self.G).mT[:, None]
-        by = [pull @ x for x in self.deviation_by(w, a)]
-        return matvec(pull, self.deviation(w, a)), by
+        pull = 2 * (self.root @ self.G).mT
+        by = [pull[:, None] @ x for x in self.deviation_by(w, a)]
+        return _times(pull, self.deviation(w, a)), by
 
     def p(self, w: Array, a: Array, b: Array) -> Array:
         """Return G (v' + w × v) − h × v, with v = M τ and h = G w."""
-        G, M = self.G[:, None], self.M[:, None]
-        h, h_rate = matvec(G, w), matvec(G, a)
-        torque_rate = matvec(G, b) + cross(a, h) + cross(w, h_rate)
-        v, v_rate = matvec(M, h_rate + cross(w, h)), matvec(M, torque_rate)
-        return matvec(G, v_rate + cross(w, v)) - cross(h, v)
+        G, M = self.G, self.M
+        h, h_rate = _times(G, w), _times(G, a)
+        torque_rate = _times(G, b) + cross(a, h) + cross(w, h_rate)
+        v, v_rate = _times(M, h_rate + cross(w, h)), _times(M, torque_rate)
+        return _times(G, v_rate + cross(w, v)) - cross(h, v)
 
     def p_by(self, w: Array, a: Array, b: Array) -> list[Array]:
         """Return the derivatives of p with respect to w, w' and w''."""
         G, M = self.G[:, None], self.M[:, None]
-        W, H = hat(w), hat(matvec(G, w))
-        V = hat(matvec(M, self.torque(w, a)))
+        W, H = hat(w), hat(_times(self.G, w))
+        V = hat(_times(self.M, self.torque(w, a)))
         T0 = W @ G - H  # the derivative of τ with respect to w
-        T1 = hat(a) @ G - hat(matvec(G, a))  # and that of τ'
+        T1 = hat(a) @ G - hat(_times(self.G, a))  # and that of τ'
         GM = G @ M
         QM = (G @ W - H) @ M
         by_w = GM @ T1 + QM @ T0 - G @ V + V @ G
         return [by_w, GM @ T0 + QM @ G, np.broadcast_to(GM @ G, W.shape)]
+
+
+def _times(A: Array, x: Array) -> Array:
+    """Return A x at each time, by one product a problem, for A (N, 3, 3) and x (N, n, 3)."""
+    return x @ A.mT
 
 
 class Jerk:

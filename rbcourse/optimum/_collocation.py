@@ -325,9 +325,10 @@ class Stationary:
             pull @ d - lacking,
             -d[:, -1],
         )
-        size = dk.shape[1]
-        turn = T.reshape(-1, size, size) @ dk
-        return Change(d + turn.reshape(d.shape), dk.reshape(d.shape), dc)
+        count, size, columns = dk.shape
+        turn = T.reshape(count, size, size) @ dk
+        dk = dk.reshape(count, 3, -1, columns).swapaxes(1, 2)
+        return Change(d + turn.reshape(d.shape), dk, dc)
 
     def known_turns(self, R: Array, errors: Errors, by_ends: bool) -> Array:
         """Return d and, if `by_ends`, also ∫ R δw dt for a unit change of each end value.
@@ -354,20 +355,23 @@ class Stationary:
 
 
 def _turns_by_k(R: Array, K: Array) -> Array:
-    """Return T of `Stationary.responses`, for x at the nodes, shape (N, n, 3, 3 n)."""
+    """Return T of `Stationary.responses`, shape (N, n, 3, 3 n).
+
+    The columns are ordered by the components of x, and then by its nodes, which is fast.
+    """
     count, n = R.shape[:2]
     entries = R.reshape(count, n, 9).mT
     T = (grid(n).integral * entries[:, :, None]) @ K
     T = T.reshape(count, 3, 3, n, n)  # the axes are row, column, node of T x, node of x
-    return T.transpose(0, 3, 1, 4, 2).reshape(count, n, 3, 3 * n)
+    return T.transpose(0, 3, 1, 2, 4).reshape(count, n, 3, 3 * n)
 
 
 def _with_rates(by_k: Array, P: list[Array], from_k: list[Array]) -> Array:
-    """Add Σ Pᵢ Kᵢ to matrices of the shape (N, n, 3, 3 n)."""
+    """Add Σ Pᵢ Kᵢ to matrices of the shape (N, n, 3, 3 n), whose columns are ordered as in T."""
     count, n = by_k.shape[:2]
-    total = by_k.reshape(count, n, 3, n, 3)
+    total = by_k.reshape(count, n, 3, 3, n)
     for Pi, K in zip(P, from_k, strict=True):
-        total += Pi[:, :, :, None] * K[:, None, :, None]
+        total += Pi[..., None] * K[:, None, None]
     return by_k
 
 

@@ -69,28 +69,34 @@ class Thresholds:
     nodes_for_rods = 33  # [25: 15 of rods, instead of 2]
     rod = 2.3  # a body is a rod if its middle moment has a larger ratio to the least one [3: 1]
     thin = 20.0  # beyond this ratio of moments, `nodes` suffice [33: at 100, 4 of 12 more fail]
-    nodes_for_spin = 16  # added to the nodes before spin is added [8: 7 of 1,200 rods, not 0]
+    nodes_for_spin = 14  # added to the nodes before spin is added [12: 4 more of 1,200 rods]
     nodes_for_jerk = 29  # the jerk needs more, since it has higher derivatives [21: 0, 17: 1]
     more_nodes = 33, 65  # for fast problems, and if a start costs less [always 17: 135]
     fast = 24.0, 80.0  # if ‖w0‖ + ‖w1‖ is larger, `more_nodes` are used [48, 160: 7]
     followed = 1.1  # Newton's method starts from curves up to this cost ratio [1.02: 1]
     followed_of_bodies = 1.02  # the same for bodies; their curves have more nodes [1.005: 2]
-    same_entries = 0.1  # starts count as equal if all entries of R differ by less [0.3: 0]
+    same_entries = 0.3  # curves count as equal if all entries of R differ by less [0.1: 0]
     known_cost = 1.01  # largest accepted ratio of a solution's cost to a start's cost [1.1: 2]
     one_start = 0.5  # if all entries of σ, w0 and w1 are smaller, one start suffices [1: 0]
     flat = 0.1  # if w deviates less from its axis, as a share, bent curves are tried [see `bend`]
     bend = 0.5  # rad: size of the bend [0.1, 1: 0; no bend: 1 of 600 bodies near an axis]
-    refined = 3.0  # curves up to this cost ratio are lowered on more nodes [1.5: 0]
-    spun = 3.0, 1.15, 1.001  # spin is added thrice, up to these cost ratios [twice: 2 of 300 rods]
+    refined = 2.0  # curves up to this cost ratio are lowered on more nodes [1.5: 0]
+    spun = 2.0, 1.1, 1.001  # spin is added thrice, up to these cost ratios [twice: 2 of 300 rods]
     worth_a_turn = 0.3  # no spin is added if the cost is below this share of a turn's cost [1: 1]
     needle = 3e4  # beyond this ratio of moments, the work is bounded [no bound: 100 s at 1e6]
     most_of_needles = 16  # promising curves [no bound: 3 of 6 rods of ratio 1e4 take over 20 s]
     most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
-    promising = 1.1  # curves above this cost ratio are dropped before more steps [1.3: 0]
-    starts = Steps(40, 5e-4)  # Gauss–Newton steps for starting curves [20 or 5e-3: 0]
+    starts = Steps(40, 5e-4)  # for starting curves [20: 0; 5e-3: 8 of 2,880 balls up to 30 rad]
     starts_of_bodies = Steps(20, 2e-3)  # for bodies; many curves are lowered again [10, 1e-2: 0]
     on_more_nodes = Steps(30, 5e-4)  # for curves of bodies, if spin is added [20, 1e-3: 2]
-    brief = Steps(10, 5e-4)  # for curves with more spin, before most are dropped [4: 2 of rods]
+    # steps for curves with more spin; after each stage, curves above a cost ratio are dropped
+    # [1.5 after 2 steps: 1 more of 1,200 rods, by 16 %; 1.1 after 10 steps, then 30: 1.4 × time]
+    race = (
+        (Steps(4, 5e-4), 2.0),
+        (Steps(6, 5e-4), 1.1),
+        (Steps(8, 5e-4), 1.04),
+        (Steps(20, 5e-4), 1.1),
+    )
     bent = Steps(40, 1e-6)  # for bent curves, which may be near a saddle [10, 1e-4: 0]
     last = Steps(200, 0.0)  # used if the other steps do not suffice [40: 0]
 
@@ -298,11 +304,10 @@ class BodySearch(Search):
                 break
             old = len(curves)
             new = spun(curves.take(some), self.ends, self.functional.G, worth)
-            new = lowered(self.functional, new, LIMITS.brief)
-            every = curves.joined(new)
-            kept = self.promising(every, LIMITS.promising)
-            kept[:old] = False
-            new = lowered(self.functional, every.take(kept), LIMITS.on_more_nodes)
+            for steps, most_costly in LIMITS.race:
+                new = lowered(self.functional, new, steps)
+                kept = self.promising(curves.joined(new), most_costly)
+                new = new.take(kept[old:])
             curves = curves.joined(new)
         return curves
 
