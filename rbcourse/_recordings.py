@@ -437,8 +437,9 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
         raise ValueError(
             f"{rows.file}: no column has the name {' or '.join(missing)}; rename those of the pose "
             "to x, y, z, qw, qx, qy, qz and that of the times to time. Or delete the line of names "
-            "and give format=, or use numpy.loadtxt, pose_from_components and exp_so3 (rotation "
-            "vectors) or matrix_from_zyx (yaw, pitch, roll, in rad). The names "
+            "and give format=, or use numpy.loadtxt, pose_from_components and "
+            "matrix_from_quaternion, exp_so3 (rotation vectors) or matrix_from_zyx (yaw, pitch, "
+            "roll, in rad). The names "
             f"are {', '.join(rows.names)[:300]!r}"
         )
     if "x" not in found and others:

@@ -207,6 +207,34 @@ def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
 
 
 @pytest.mark.parametrize("smooth", METHODS)
+@pytest.mark.parametrize("part", ["turn", "origin"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_wrong_poses_are_announced(smooth, part, count):
+    """The wrong poses are off by 50 times the noise."""
+    rng, t = np.random.default_rng(11), np.linspace(0, 4, 200)
+    steady = rb.exp_se3(t[:, None] * [0, 0.3, 1, 0.2, 0, 0])
+    good = steady @ rb.exp_se3(0.002 * rng.normal(size=(200, 6)))
+    with warnings.catch_warnings(action="error"):
+        smooth(t, good)
+    shift = np.zeros(6)
+    shift[0 if part == "turn" else 4] = 0.1
+    wrong = good.copy()
+    wrong[60 : 60 + count] @= rb.exp_se3(shift)
+    message = rf"^poses\[(59|6[0-3])\] or a pose near it may be wrong: its {part} is .* times"
+    with pytest.warns(RuntimeWarning, match=message):
+        smooth(t, wrong)
+
+
+@pytest.mark.parametrize("smooth", METHODS)
+def test_cross_validation_of_few_poses_is_announced(smooth):
+    """These poses have no noise, but a curve that hardly moves is found."""
+    t = np.arange(4) / 3
+    path = np.stack([np.sin(2 * np.pi * t), 0 * t, 0 * t], axis=-1)
+    with pytest.warns(RuntimeWarning, match="cross validation of 4 poses may take the motion for"):
+        smooth(t, rb.pose_from_components(np.eye(3), path))
+
+
+@pytest.mark.parametrize("smooth", METHODS)
 def test_a_gap_is_announced(smooth):
     """A gap of two periods; every tenth time, and random times without a gap, are no gaps."""
     t = np.linspace(0, 8, 200)

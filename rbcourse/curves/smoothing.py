@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._checks import as_single, check_all
 from rbcourse._numerics import Array, matvec
@@ -39,13 +39,15 @@ from rbcourse.curves.rigid import RigidMotion
 from rbcourse.curves.velocities import usual_step
 from rbcourse.projection import nearest
 from rbcourse.quaternion import continuous_quaternions, quaternion_conjugate, quaternion_multiply
-from rbcourse.so3 import vee
+from rbcourse.so3 import log, vee
 
 LEAST, STEP, MOST = -12.0, 1.5, 28.0  # of log λ, if the mean step and the mean weight are 1
 TOGETHER = 1e-3  # of the usual step [one pair apart by 2e-5 changed the best period by 8 %]
 LEAST_PERIOD = 1e-3  # in mean steps; below, the degrees of freedom and the noise are lost
 _RATIO = 1e6  # of weights; with 1e12, a period of 1,000 steps gives a noise that is wrong by 30 %
 _GAP = 5.0  # usual steps; shorter steps are no gaps [the longest of 1,000 random ones: 3.4 to 8]
+_FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
+_WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
 _DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
 
 
@@ -115,7 +117,9 @@ def smoothing_spline(
     RuntimeWarning
         If the body turns by more than 1 rad in the time period/2π, if an interval between two times
         is longer than the period and than five usual steps (the motion in this gap is not known;
-        smooth both sides apart), or if, without a given period, nothing is smoothed.
+        smooth both sides apart), or if, without a given period, nothing is smoothed, or a pose is
+        ten times as far from the curve as half of the poses are, or if cross validation has fewer
+        than ten poses.
 
     Notes
     -----
@@ -128,7 +132,7 @@ def smoothing_spline(
     Moved rotations give the moved curve; reversed times reverse it. A pose of another point of the
     body is smoothed differently, since the origin is. Singular set: that of `quaternion_spline`.
 
-    A large ``noise`` of the result is a sign of wrong poses. This loop finds them, and then
+    A few wrong poses spoil the curve. This loop finds them, and then
     ``times[good]`` and ``poses[good]`` are smoothed. For rotations, off is turn / median(turn). The
     period of ten steps is for bodies that turn by less than 10° in a step::
 
@@ -167,6 +171,7 @@ def smoothing_spline(
     smoother.check_gaps(c.period)
     if period is None:
         smoother.check_noise(c.period, noise)
+        smoother.check_poses(c, A)
     return c
 
 
@@ -434,12 +439,41 @@ class Smoother:
                 stacklevel=3,
             )
 
+    def is_least(self, periods: Any) -> NDArray[np.bool_]:
+        """Tell which of the periods are the least one that is tried."""
+        return np.atleast_1d(periods) < self.period(np.exp(LEAST + STEP))
+
     def check_noise(self, periods: Any, noise: ArrayLike | None) -> None:
-        """Warn if the best of the tried periods is the least one."""
-        least = np.atleast_1d(periods) < self.period(np.exp(LEAST + STEP))
+        """Warn if there are few poses, or if the best of the tried periods is the least one."""
+        if noise is None and len(self.knots) < _FEW:
+            warnings.warn(
+                f"cross validation of {len(self.knots)} poses may take the motion for noise, and "
+                f"{_FEW} or more are wanted; give noise or period",
+                RuntimeWarning,
+                stacklevel=3,
+            )
+            return
+        least = self.is_least(periods)
         if least.any():
             part = ("rotations: ", "origins: ")[np.argmax(least)] if least.size == 2 else ""
             why = "cross validation finds nothing to smooth, so the noise is not known; give noise"
             if noise is not None:
                 why = "nothing is smoothed; some poses are wrong, or noise is too small; change it"
             warnings.warn(f"{part}{why} or period", RuntimeWarning, stacklevel=3)
+
+    def check_poses(self, curve: Any, poses: Array) -> None:
+        """Warn if a pose is much farther from the curve than half of the poses are."""
+        near = curve(self.knots)[self.which]
+        turn = log(near[:, :3, :3].mT @ poses[:, :3, :3])
+        errors = {"turn": turn, "origin": near[:, :3, 3:] - poses[:, :3, 3:]}
+        for (part, error), least in zip(errors.items(), self.is_least(curve.period), strict=False):
+            size = np.sqrt(self.weights) * np.linalg.norm(error.reshape(-1, 3), axis=1)
+            i, usual = np.argmax(size), np.median(size)
+            if size[i] > _WRONG * usual and not least:
+                warnings.warn(
+                    f"poses[{i}] or a pose near it may be wrong: its {part} is "
+                    f"{size[i] / usual:.0f} times as far from the curve as usual; the loop in "
+                    "help(rbcourse.smoothing_spline) finds wrong poses",
+                    RuntimeWarning,
+                    stacklevel=3,
+                )

@@ -127,6 +127,7 @@ def minimum_acceleration_smoothing(
     smoother.check_gaps(c.period)
     if period is None:
         smoother.check_noise(c.period, noise)
+        smoother.check_poses(c, A)
     return c
 
 
