@@ -31,8 +31,10 @@ def main() -> None:
             rows = collect(known.folder, assignments, known.due)
             for kind in LISTS:
                 own = [(what, why) for name, what, why in rows if name == kind]
+                dated = kind == "late" and known.due
                 if own or kind == "collected":
-                    print(f"{kind}: {len(own)}")
+                    print(f"{kind}, after {known.due:%Y-%m-%d %H:%M}" if dated else kind, end=": ")
+                    print(len(own))
                 for reason in dict.fromkeys(why for _, why in own):
                     same = (what for what, why in own if why == reason)
                     print(f"  {'; '.join(same)}: {reason}")

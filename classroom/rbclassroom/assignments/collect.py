@@ -224,7 +224,11 @@ def _why_late(about: dict[str, str], due: datetime | None) -> str:
     """Return why an upload is late, or ""."""
     if about["late"]:
         return "Canvas marks it as late"
-    if not due or about["number"] or about["date"] <= written(due):
+    if not due or about["number"]:
+        return ""
+    if about["exact"] == "no":
+        return "perhaps: the date in its name was not read; look in the LMS"
+    if about["date"] <= written(due):
         return ""
     date = datetime.fromisoformat(about["date"].replace(" UTC", "+00:00"))
     local = f"{date.astimezone():%Y-%m-%d %H:%M:%S}"

@@ -36,7 +36,9 @@ CANVAS = re.compile(  # a file: berganna_LATE_12345_67890_ps1.ipynb, but not 202
     r"(?:(?P<name>\d*[^\W\d_].*?)_)??(?P<late>LATE_)?(?P<id>anon_[^_]+|(?!(?:19|20)\d\d_\d\d?_)\d+)"
     r"_(?P<number>\d+)_(?P<file>.+)"
 )
-DATES = "%Y-%m-%d-%H-%M-%S", "%b %d, %Y %I%M %p"  # of Blackboard and Brightspace
+DAYS, TIMES = ("%b %d", "%B %d", "%d %b", "%d %B"), ("%I%M %p", "%H%M")
+DATES = ["%Y-%m-%d-%H-%M-%S"]  # of Blackboard
+DATES += [f"{day}, %Y {time}" for day in DAYS for time in TIMES]  # of Brightspace
 PERSON = re.compile(r"[^\W\d_a-z]\w+[ _]+[^\W\d_a-z]\w+")  # as in "Anna Berg - ps1.ipynb"
 GENERIC = {"to_submit", "work", "submissions", "submission", "downloads", "assignments", "email"}
 GENERIC |= {"late", "abgabe", "abgaben"}  # no names of students
@@ -233,6 +235,7 @@ def _about(found: dict[str, Any], file: File, at: int) -> dict[str, str]:
     about = dict.fromkeys(("name", "id", "folder", "unsure", "late", "number", "file", "exact"), "")
     about |= {key: value or "" for key, value in found.items()}
     when = written(next(date for date in file.dates[at:] if date))
+    about["exact"] = "no" if about.get("date") else ""
     for form in DATES:
         with contextlib.suppress(ValueError, OverflowError):
             when = written(datetime.strptime(about.get("date", ""), form))

@@ -38,6 +38,8 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
         raise Refused(f"{name} is empty; take an earlier copy, or start again")
     if content.startswith((b"%PDF", b"PK")):
         raise Refused(f"{name} is a PDF or an archive, not a notebook; hand in the notebook")
+    if name.lower().endswith(".py"):
+        raise Refused(f"{name} is a script, not a notebook; hand in the notebook")
     try:
         try:
             found = json.loads(content, strict=False)

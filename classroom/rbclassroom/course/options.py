@@ -22,12 +22,14 @@ def repository(text: str) -> str:
 
 
 def date(text: str) -> datetime:
-    """Return a date with a time, or refuse it."""
+    """Return a date with a time, or refuse it; a date without a time means the end of the day."""
     try:
-        return datetime.fromisoformat(text)
+        given = datetime.fromisoformat(text)
     except ValueError:
         wanted = 'a date such as "2026-12-01 23:59" is wanted'
         raise argparse.ArgumentTypeError(f"{wanted}, got {text}") from None
+    has_time = len(text) > len("2026-12-01")
+    return given if has_time else given.replace(hour=23, minute=59, second=59)
 
 
 def parser(task: str, purpose: str = "") -> argparse.ArgumentParser:
@@ -57,7 +59,7 @@ def parser(task: str, purpose: str = "") -> argparse.ArgumentParser:
         add("--solutions", action="store_true", help="write the model answers instead")
     elif task == "collect":
         add("folder", type=Path, help="the folder with the downloads from Moodle or Canvas")
-        add("--due", type=date, help='such as "2026-12-01 23:59"')
+        add("--due", type=date, help='such as "2026-12-01 23:59"; without a time, 23:59:59')
     elif task == "grade":
         add("sets", nargs="*", metavar="set", help="such as ps1; by default all sets")
         risk = "grade even if there is no sandbox: submissions can then do all that you can do"

@@ -24,6 +24,7 @@ from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.collect import collect, read_owners, read_report
 from rbclassroom.assignments.submissions import read_notebook
+from rbclassroom.course import options
 
 DAY = (2026, 11, 20, 12, 0, 0)
 LATER = (2026, 12, 2, 12, 0, 0)
@@ -431,6 +432,31 @@ def test_a_namesake_in_a_later_download_does_not_replace_the_first(course):
     assert files(course) == {"al_li/ps1": "first", "al_li_22/ps1": "second"}
 
 
+@pytest.mark.parametrize(
+    ("date", "late"),
+    [
+        ("Dec 2, 2026 1030 PM", "handed in at 2026-12-02 22:30:00"),
+        ("December 2, 2026 930 AM", "handed in at 2026-12-02 09:30:00"),
+        ("2 December, 2026 2230", "handed in at 2026-12-02 22:30:00"),
+        ("2 Dec, 2026 1030 PM", "handed in at 2026-12-02 22:30:00"),
+        ("1 December, 2026 2358", ""),
+        ("2 décembre, 2026 2230", "perhaps: the date in its name was not read"),
+    ],
+)
+def test_late_work_is_found_by_dates_in_names(course, date, late):
+    """The date of the file itself is long before the due date."""
+    name = f"39-25 - Anna Berg - {date}/ps1.ipynb"
+    rows = collected(course, {name: answered(course)}, datetime(2026, 12, 1, 23, 59))
+    found = [why for kind, _, why in rows if kind == "late"]
+    assert len(found) == bool(late)
+    assert all(late in why for why in found)
+
+
+def test_a_due_date_without_a_time_is_the_end_of_the_day():
+    assert options.date("2026-12-01") == datetime(2026, 12, 1, 23, 59, 59)
+    assert options.date("2026-12-01 00:00") == datetime(2026, 12, 1)
+
+
 def test_odd_dates_do_not_lose_a_file(course):
     zipped = bytearray(packed({moodle("A_1"): answered(course), moodle("B_2"): answered(course)}))
     at = zipped.index(b"PK\x01\x02")
@@ -563,7 +589,7 @@ def test_the_command_prints_each_list(course, monkeypatch):
     )
     assert done.stderr == ""
     heads = [line for line in done.stdout.splitlines() if not line.startswith(" ")]
-    assert heads == ["collected: 3", "late: 3", "ignored: 1"]
+    assert heads == ["collected: 3", "late, after 2000-01-01 12:00: 3", "ignored: 1"]
     assert "  a, ps1; b, ps1: perhaps: 2026-11-20 12:00:00 may be the date" in done.stdout
     monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
     with pytest.raises(SystemExit, match="folder: an existing folder is wanted, got nowhere"):
