@@ -80,9 +80,9 @@ def main():
     if task in PATHS and Path.cwd() != ROOT:
         words = [from_here(word) for word in words]
     set_up(environment)
+    # matrices are small; on a busy machine, two threads take four times as long as one
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if task in ("test", "figures"):
-        # matrices are small; on a busy machine, two threads take four times as long as one
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         # with this variable, each process would compile all modules again
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     for command in commands:

@@ -201,9 +201,8 @@ def test_each_task_passes_its_arguments_to_its_modules(task, done, tmp_path, mon
     assert [words[0] for words in ran] == [command.split()[0] for command in commands]
     for name, *_ in ran:
         assert find_spec(name), name
-    alone = task in ("test", "figures")
-    assert os.environ.pop("OPENBLAS_NUM_THREADS", "") == "1" * alone
-    assert ("PYTHONDONTWRITEBYTECODE" in os.environ) is not alone
+    assert os.environ.pop("OPENBLAS_NUM_THREADS", "") == "1"
+    assert ("PYTHONDONTWRITEBYTECODE" in os.environ) is not (task in ("test", "figures"))
 
 
 @pytest.mark.parametrize("task", course.TASKS)
