@@ -95,6 +95,7 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     for step in (work.join_copies, work.put_back, work.complete):
         for name in work.wanted:
             step(name)
+    work.find_second_definitions()
     return work.finish()
 
 
@@ -330,6 +331,20 @@ class _Restoring:
             return kinds[0] or [cell for cell in near if cell.cell_type == "raw"]
         fits = [[c for c in cells if _defines(c, given)] for cells in (*kinds, near, own)]
         return next((cells[-1:] for cells in fits if cells), [])
+
+    def find_second_definitions(self) -> None:
+        """Note added cells that define the function of an answer again, below the answer."""
+        noted, above = {name for name, _ in self.changes}, list[NotebookNode]()
+        for cell in self.cells:
+            if grade_id(cell):
+                above += [self.wanted[grade_id(cell)]] * is_answer(self.wanted[grade_id(cell)])
+            elif (
+                cell.cell_type == "code"
+                and cell.id not in noted
+                and any(_defines(cell, given) for given in above)
+            ):
+                why = "defines the function of an answer again; only the answer above it is tested"
+                self.changes.append((cell.id, why))
 
     def finish(self) -> list[str]:
         """Set the metadata of added cells, and return the remarks."""

@@ -269,6 +269,11 @@ FOUND = {
         ["1 cells have lost", "each was missing"],
     ),
     "half of a locked text": (stubbed(IMPORTS, "import math\n\nimport math"), 0, [CHANGED]),
+    "another version at the end": (
+        added(8, code("def square(x):\n    return 0")),
+        1,
+        ["defines the function of an answer again"],
+    ),
     "points": (marked(points=20, grade=False), 0, ["has other points or marks; it is restored"]),
     "moved to the end": (moved, 0, ["not in the order"]),
 }
