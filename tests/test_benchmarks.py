@@ -29,6 +29,7 @@ def test_ratios_compare_methods_under_the_same_load():
     assert times[1:] / times[:-1] == pytest.approx(2)
 
 
+@pytest.mark.filterwarnings("ignore:cross validation of 3 poses")
 @pytest.mark.parametrize("task", benchmarks.TASKS, ids=lambda task: " ".join(task[:2]))
 def test_all_methods_of_a_task_agree(task):
     name, _, sizes, make, *options = task
