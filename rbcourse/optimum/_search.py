@@ -87,7 +87,7 @@ class Thresholds:
     most_of_needles = 16  # promising curves [no bound: 3 of 6 rods of ratio 1e4 take over 20 s]
     most = 100  # promising curves of a problem [at ratio 10: at most 65; at 50, no limit: 9 × time]
     starts = Steps(40, 5e-4)  # for starting curves [20: 0; 5e-3: 8 of 2,880 balls up to 30 rad]
-    starts_of_bodies = Steps(20, 2e-3)  # for bodies; many curves are lowered again [10, 1e-2: 0]
+    starts_of_bodies = Steps(12, 5e-3)  # for bodies [20, 2e-3: 0; 10, 1e-2: 1 more of 1,200 rods]
     on_more_nodes = Steps(30, 5e-4)  # for curves of bodies, if spin is added [20, 1e-3: 2]
     # steps for curves with more spin; after each stage, curves above a cost ratio are dropped
     # [1.5 after 2 steps: 1 more of 1,200 rods, by 16 %; 1.1 after 10 steps, then 30: 1.4 × time]
