@@ -225,6 +225,16 @@ def test_wrong_poses_are_announced(smooth, part, count):
         smooth(t, wrong)
 
 
+@pytest.mark.parametrize("rests", [0, 900])
+def test_no_pose_of_a_motion_without_noise_is_called_wrong(rests):
+    """A steady turn has errors of rounding. After a rest, poses have rounded coordinates."""
+    t = np.arange(1500) / 100
+    turn = np.maximum(t - t[rests], 0)
+    vectors = (turn if not rests else (1 - np.cos(3 * turn)).round(4))[:, None] * [0, 0.3, 0.8]
+    with warnings.catch_warnings(action="error"):
+        rb.smoothing_spline(t, rb.exp_so3(vectors))
+
+
 @pytest.mark.parametrize("smooth", METHODS)
 def test_cross_validation_of_few_poses_is_announced(smooth):
     """These poses have no noise, but a curve that hardly moves is found."""

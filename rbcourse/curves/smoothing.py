@@ -48,6 +48,7 @@ _RATIO = 1e6  # of weights; with 1e12, a period of 1,000 steps gives a noise tha
 _GAP = 5.0  # usual steps; shorter steps are no gaps [the longest of 1,000 random ones: 3.4 to 8]
 _FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
 _WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
+_ROUNDING = 1e-9  # times the largest entry of the poses; smaller errors are those of rounding
 _DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
 
 
@@ -462,13 +463,17 @@ class Smoother:
             warnings.warn(f"{part}{why} or period", RuntimeWarning, stacklevel=3)
 
     def check_poses(self, curve: Any, poses: Array) -> None:
-        """Warn if a pose is much farther from the curve than half of the poses are."""
+        """Warn if a pose is much farther from the curve than half of the poses are.
+
+        Poses on the curve are not counted: those of a rest may have no noise.
+        """
         near = curve(self.knots)[self.which]
         turn = log(near[:, :3, :3].mT @ poses[:, :3, :3])
         errors = {"turn": turn, "origin": near[:, :3, 3:] - poses[:, :3, 3:]}
         for (part, error), least in zip(errors.items(), self.is_least(curve.period), strict=False):
             size = np.sqrt(self.weights) * np.linalg.norm(error.reshape(-1, 3), axis=1)
-            i, usual = np.argmax(size), np.median(size)
+            i, off = np.argmax(size), size > _ROUNDING * (1 + np.abs(poses).max())
+            usual = np.median(size[off]) if off.any() else np.inf
             if size[i] > _WRONG * usual and not least:
                 warnings.warn(
                     f"poses[{i}] or a pose near it may be wrong: its {part} is "

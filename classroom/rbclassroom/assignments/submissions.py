@@ -333,18 +333,18 @@ class _Restoring:
         return next((cells[-1:] for cells in fits if cells), [])
 
     def find_second_definitions(self) -> None:
-        """Note added cells that define the function of an answer again, below the answer."""
-        noted, above = {name for name, _ in self.changes}, list[NotebookNode]()
+        """Note added cells that define the function of an answer again, below its test."""
+        noted, above, tested = {name for name, _ in self.changes}, [], list[NotebookNode]()
         for cell in self.cells:
-            if grade_id(cell):
-                above += [self.wanted[grade_id(cell)]] * is_answer(self.wanted[grade_id(cell)])
-            elif (
-                cell.cell_type == "code"
-                and cell.id not in noted
-                and any(_defines(cell, given) for given in above)
-            ):
-                why = "defines the function of an answer again; only the answer above it is tested"
-                self.changes.append((cell.id, why))
+            given = self.wanted.get(grade_id(cell))
+            if given and is_answer(given):
+                above.append(given)
+            elif given and given.cell_type == "code":
+                tested, above = tested + above, []
+            again = cell.cell_type == "code" and any(_defines(cell, each) for each in tested)
+            if again and not given and cell.id not in noted:
+                why = "defines the function of an answer again, below its test"
+                self.changes.append((cell.id, f"{why}; put it into the answer"))
 
     def finish(self) -> list[str]:
         """Set the metadata of added cells, and return the remarks."""

@@ -272,7 +272,12 @@ FOUND = {
     "another version at the end": (
         added(8, code("def square(x):\n    return 0")),
         1,
-        ["defines the function of an answer again"],
+        ["defines the function of an answer again, below its test"],
+    ),
+    "another version above the test": (
+        added(SQUARE + 1, code("def square(x):\n    return x * x")),
+        1,
+        [],
     ),
     "points": (marked(points=20, grade=False), 0, ["has other points or marks; it is restored"]),
     "moved to the end": (moved, 0, ["not in the order"]),
