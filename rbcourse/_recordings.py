@@ -23,6 +23,7 @@ Columns: TypeAlias = dict[str, int]
 """The place of each column by its meaning."""
 
 POSITION, QUATERNION = ["x", "y", "z"], ["qw", "qx", "qy", "qz"]
+MATRIX = [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
 FORMATS = {
     "csv": ["time", *POSITION, *QUATERNION],
     "euroc": ["time", *POSITION, *QUATERNION],
@@ -55,6 +56,7 @@ _MEANINGS = {
     r"(?P<axis>[xyz])(_(p|pos|position))?",
     "q": r"((.*_)?(quat|quaternion|orientation|rot|rotation|attitude)|(.*_)?q(_[a-z]{1,2}){0,2})_?"
     r"(?P<axis>[wxyz])",
+    "r": r"((.*_)?(pose|rot|rotation)_)?r_?(?P<axis>[123]{2})",
 }
 """The meanings of columns, by their names in small letters, with _ between words and no unit.
 
@@ -75,7 +77,7 @@ _PART_OF_TIME = re.compile(
 """Names of columns that hold a part of the time, beside a column of seconds."""
 _KIND = re.compile(
     r"pose|pos|position|trans|translation|location|quat|quaternion|orientation|rot|rotation"
-    r"|attitude|p|q|(t|p|q|pos|rot|quat)?[wxyz]"
+    r"|attitude|p|q|(t|p|q|pos|rot|quat)?[wxyz]|r|r?[123]{2}"
 )
 """Words in the names of columns that do not name a body or a frame."""
 _ORDER = re.compile(
@@ -130,14 +132,16 @@ class _Rows(NamedTuple):
 
 def read_recording(
     file: File,
-    form: str | None,
+    form: str | Sequence[str] | None,
     unit: str | None,
     times: File | ArrayLike | None,
     rate: float | None,
     skip: Collection[str],
 ) -> Recording:
     """Read the rows of a file with poses; the arguments are those of `read_path`."""
-    rows = _read_rows(file)
+    named = form if isinstance(form, list | tuple) else None
+    form = form if isinstance(form, str) else None
+    rows = _read_rows(file, named)
     timed = times is not None or rate is not None
     if rows.names:
         columns, stated, length = _named(rows, form)
@@ -256,11 +260,12 @@ def to_number(place: str, cell: str) -> float:
     return number
 
 
-def _read_rows(file: File) -> _Rows:
+def _read_rows(file: File, named: Sequence[str] | None) -> _Rows:
     """Read the lines of a file without comments, and the names of its columns if it has them.
 
-    A comment begins with # or %, or with # after and before white space. The names are in the last
-    line before the numbers, or in a comment before them.
+    The names in `named` replace those of the file. A comment begins with # or %, or with # after
+    and before white space. The names are in the last line before the numbers, or in a comment
+    before them.
     """
     every, heads = text_lines(file), list[tuple[int, str, bool]]()
     if every[0].startswith(("Format Version", "Objects")):
@@ -286,6 +291,13 @@ def _read_rows(file: File) -> _Rows:
         texts = [re.sub(r"\s#(\s.*)?$", "", text) for text in texts]
     separator, texts = _separated(file, lines, texts)
     rows = _Rows(file, lines, texts, separator, [])
+    if named is not None:
+        if len(named) > (width := len(rows.cells(0))):
+            raise ValueError(
+                f"{rows.place(0)}: {len(named)} columns are wanted for format={[*named]}, got "
+                f"{width}"
+            )
+        return rows._replace(names=[*named, *[""] * (width - len(named))])
     names = _header(rows, heads)
     unread = [f"line {n}: {text}" for n, text, _ in heads if not names and _ORDER.search(text)]
     return rows._replace(names=names, comment="".join(unread[:1]))
@@ -416,30 +428,30 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
             raise ValueError(f"{rows.file}: {names} both name a column of {meaning}; rename one")
     read = {i for places in found.values() for i in places}
     others = [name for i, name in enumerate(rows.names) if i not in read]
-    others = [name for name in others if not _OTHER.fullmatch("_".join(_words(name)))]
+    others = [n for n in others if _words(n) and not _OTHER.fullmatch("_".join(_words(n)))]
     if parts := [name for name in others if _PART_OF_TIME.fullmatch("_".join(_words(name)))]:
         raise ValueError(
             f"{rows.file}: {parts[0]} may be a part of the time; write the whole time in one column"
         )
-    of_pose = [rows.names[found[x][0]] for x in (*QUATERNION, *POSITION) if x in found]
+    of_pose = [rows.names[found[x][0]] for x in (*QUATERNION, *MATRIX, *POSITION) if x in found]
     for one, other in pairwise(of_pose):
         if (bodies := (_body(one), _body(other))) and all(bodies) and bodies[0] != bodies[1]:
             raise ValueError(
-                f"{rows.file}: {other} and {one} may be of two bodies or frames; rename those of "
-                "one body to x, y, z, qw, qx, qy, qz"
+                f"{rows.file}: {other} and {one} may be of two bodies or frames; format= may be a "
+                "list of names for all columns, with x, y, z, qw, qx, qy, qz for one body"
             )
     axes = list(filter(_AXIS.search, others))
-    wanted = list(QUATERNION)
+    quaternions = "qw" in found or not found.keys() & set(MATRIX)
+    wanted = list(QUATERNION if quaternions else MATRIX)
     wanted += POSITION if axes or found.keys() & set(POSITION) else []
     velocities = list(VELOCITIES.values())[: 6 if "x" in found else 3]
     wanted += velocities if found.keys() & set(velocities) else []
     if missing := [meaning for meaning in wanted if meaning not in found]:
         raise ValueError(
-            f"{rows.file}: no column has the name {' or '.join(missing)}; rename those of the pose "
-            "to x, y, z, qw, qx, qy, qz and that of the times to time. Or delete the line of names "
-            "and give format=, or use numpy.loadtxt, pose_from_components and "
-            "matrix_from_quaternion, exp_so3 (rotation vectors) or matrix_from_zyx (yaw, pitch, "
-            "roll, in rad). The names "
+            f"{rows.file}: no column has the name {' or '.join(missing)}; format= may be a "
+            "list of names for all columns, such as ['time', 'x', 'y', 'z', 'qw', 'qx', 'qy', "
+            "'qz']. Files without quaternions need numpy.loadtxt, pose_from_components, and "
+            "exp_so3 (rotation vectors) or matrix_from_zyx (yaw, pitch, roll, in rad). The names "
             f"are {', '.join(rows.names)[:300]!r}"
         )
     if "x" not in found and others:
@@ -450,7 +462,8 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     time = units.get("time")
     if time not in (None, *DIGITS):
         raise ValueError(f"{rows.file}: times in s, ms, us or ns are wanted, got {time!r}")
-    columns = {meaning: i for meaning, [i] in found.items()}
+    unused = MATRIX if quaternions else ()
+    columns = {meaning: i for meaning, [i] in found.items() if meaning not in unused}
     if form is not None:
         given = {name: i for i, name in enumerate(FORMATS[form])}
         if any(columns[name] != given.get(name) for name in QUATERNION):
@@ -479,7 +492,8 @@ def _unnamed(rows: _Rows, form: str | None, timed: bool) -> Columns:
     if form is None:
         hints = {
             7: "If these are TUM poses without times, times= or rate= gives the times",
-            13: "If these are KITTI poses after a column of times, move the times to times=",
+            13: "If these are KITTI poses after a column of times, format= may be "
+            f"{['time', *FORMATS['kitti']]}",
             11: "If these are times in ns, positions and quaternions (w, x, y, z), as of "
             "VINS-Fusion, format='euroc' reads them",
             16: "numpy.loadtxt(file).reshape(-1, 4, 4) reads 4 × 4 matrices",
@@ -508,8 +522,9 @@ def _check_times(rows: _Rows, columns: Columns, timed: bool) -> None:
     if not timed and "time" not in columns:
         kind = "is a KITTI file, without times"
         if rows.names:
-            listed = ", ".join(rows.names)[:300]
-            kind = f"has no column with the name time; if one of {listed!r} is the time, rename it"
+            listed = ", ".join(filter(None, rows.names))[:300]
+            kind = "has no column with the name time; "
+            kind += f"if one of {listed!r} is the time, format= names it"
         raise ValueError(
             f"{rows.file} {kind}: times= takes a file with a time in each line, or the times, and "
             "rate= the number of poses in a second"

@@ -19,6 +19,7 @@ from rbcourse._recordings import (
     DIGITS,
     EXACT,
     FORMATS,
+    MATRIX,
     POSITION,
     QUATERNION,
     VELOCITIES,
@@ -48,6 +49,7 @@ __all__ = [
     "write_path",
 ]
 
+Format: TypeAlias = Literal["csv", "tum", "euroc", "kitti"]
 Skip: TypeAlias = Literal["repeated", "nan", "unordered"]
 HEADER = ["time [s]", "x [m]", "y [m]", "z [m]", "qw [1]", "qx [1]", "qy [1]", "qz [1]"]
 ACCELERATIONS = [
@@ -144,7 +146,7 @@ def write_path(
 def read_path(
     file: File,
     *,
-    format: Literal["csv", "tum", "euroc", "kitti"] | None = None,  # noqa: A002
+    format: Format | list[str] | tuple[str, ...] | None = None,  # noqa: A002
     unit: Literal["s", "ms", "us", "ns"] | None = None,
     times: File | ArrayLike | None = None,
     rate: float | None = None,
@@ -155,20 +157,23 @@ def read_path(
 
     The content of the file tells its format, not its name. If a line, which may be a comment, names
     the columns, then the names tell which column has the time, x, y, z, and the components of the
-    quaternion; units such as [ns] or [mm] in the names are converted. Other columns are not read,
-    except those of velocities that `write_path` wrote. Without names, 8 columns separated by white
-    space are TUM (time, position, quaternion (x, y, z, w)), and 12 are the first three rows of a
-    pose (KITTI). Columns are separated by commas, semicolons, tabs or blanks. If semicolons
-    separate them, decimals may have commas. Blank lines and comments, which begin with #, may be
-    anywhere. Each rotation is replaced by the nearest one. A malformed file is rejected as a whole.
+    quaternion or of the matrix (r11 to r33); units such as [ns] or [mm] in the names are converted.
+    Other columns are not read, except those of velocities that `write_path` wrote. Without names, 8
+    columns separated by white space are TUM (time, position, quaternion (x, y, z, w)), and 12 are
+    the first three rows of a pose (KITTI). Columns are separated by commas, semicolons, tabs or
+    blanks. If semicolons separate them, decimals may have commas. Blank lines and comments, which
+    begin with #, may be anywhere. Each rotation is replaced by the nearest one. A malformed file is
+    rejected as a whole.
 
     Parameters
     ----------
     file : str or Path
         A text file in UTF-8.
-    format : {"csv", "tum", "euroc", "kitti"}, optional
+    format : {"csv", "tum", "euroc", "kitti"} or list of str, optional
         The order of the columns, for files that have no names of columns and can be read in two
-        ways. Further columns at the end are not read. By default, the content tells the format.
+        ways. Or a list of names, which replace those of the file: time, x, y, z, and qw, qx, qy, qz
+        or r11 to r33, with units as in "x [mm]"; columns with other names, such as "-", are not
+        read. Further columns at the end are not read. By default, the content tells the format.
     unit : {"s", "ms", "us", "ns"}, optional
         The unit of the times in the file. By default, the name of the column tells it, EuRoC has
         ns, and all others have s.
@@ -223,12 +228,14 @@ def read_path(
     skip = [skip] if isinstance(skip, str) else list(skip)
     for name, values, known in (
         ("skip", skip, ["repeated", "nan", "unordered"]),
-        ("format", [format], [None, *FORMATS]),
+        ("format", [] if isinstance(format, list | tuple) else [format], [None, *FORMATS]),
         ("unit", [unit], [None, *DIGITS]),
     ):
         if wrong := [value for value in values if value not in known]:
             wanted = ", ".join(repr(each) for each in known if each)
             raise ValueError(f"{name}: one of {wanted} is wanted, got {wrong[0]!r}")
+    if isinstance(format, list | tuple) and not all(isinstance(name, str) for name in format):
+        raise ValueError(f"format: names of columns are wanted, got {format!r:.60}")
     if times is not None and rate is not None:
         raise ValueError("times, rate: one of them is wanted, got both")
     recording = read_recording(file, format, unit, times, rate, skip)
@@ -340,7 +347,7 @@ def _rotations(recording: Recording) -> Array:
     """Return the nearest rotations of the quaternions or matrices of a recording."""
     columns = recording.columns
     if "r11" in columns:
-        M = _stacked(columns, [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]).reshape(-1, 3, 3)
+        M = _stacked(columns, MATRIX).reshape(-1, 3, 3)
         passed = is_so(M, _TOLERANCE)
         if not passed.all():
             raise ValueError(

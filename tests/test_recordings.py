@@ -46,6 +46,7 @@ GOOD = {
         {},
         [1403636580.83856],
     ),
+    "both.csv": (f"t,x,y,z,qw,qx,qy,qz,r11,r12,r13\n0.5,{ROWS},9,9,9\n", {}, [0.5]),
     "rpg_with_ids.txt": (f"# id timestamp tx ty tz qx qy qz qw\n7 1.5 {ROW}\n", {}, [1.5]),
     "tabs.txt": (f"0.5 {ROW}\n".replace(" ", "\t"), {}, [0.5]),
     "commas.tum": (f"0.5 {ROW}\n".replace(" ", ","), {}, [0.5]),
@@ -198,7 +199,7 @@ REFUSED = {
     "motive.csv": (MOTIVE, "line 1: for files of Motive and Vicon, docs/recording.md has code"),
     "vicon_tracker.csv": (VICON, "line 1: for files of Motive and Vicon"),
     "kitti.txt": (KITTI, "is a KITTI file, without times: times= takes a file"),
-    "kitti_with_frame.txt": ("0 " + KITTI, "13 columns.*move the times to times="),
+    "kitti_with_frame.txt": ("0 " + KITTI, "13 columns.*format= may be .'time', 'r11'"),
     "replica.txt": ("1 0 0 0 " * 4 + "\n", "16 columns.*reshape"),
     "tartanair.txt": (f"{ROW}\n", "7 columns.*TUM poses without times, times= or rate="),
     "arkit.csv": (f"0.5,{ROWS}\n", "format='tum' reads quaternions.*format='csv'"),
@@ -298,6 +299,34 @@ def test_names_in_any_order_tell_the_columns(tmp_path):
         times, poses, _ = rb.read_path(written(tmp_path, "a.csv", "\n".join([*lines, ""])))
         assert times == 0.5
         assert np.abs(poses - P).max() < 1e-15
+
+
+def test_given_names_replace_those_of_the_file(tmp_path):
+    names = ["time", "x [mm]", "y [mm]", "z [mm]", "qw", "qx", "qy", "qz"]
+    head = "clock,ee_x,ee_y,ee_z,q0,q1,q2,q3,quality\n"
+    file = written(tmp_path, "a.csv", f"{head}0,{ROWS},5\n2,{ROWS},6\n")
+    times, poses, _ = rb.read_path(file, format=names)
+    assert times.tolist() == [0, 2]
+    assert np.abs(poses[:, :3, :3] - P[:3, :3]).max() < 1e-15
+    assert np.abs(1000 * poses[:, :3, 3] - P[:3, 3]).max() < 1e-15
+    rotations = rb.read_path(file, format=["-"] * 4 + names[4:], rate=2)[1]
+    assert np.abs(rotations - P[:3, :3]).max() < 1e-15
+    for wrong, message in (
+        ([*names, "a", "b"], "line 2: 10 columns are wanted for format="),
+        (names[:-1], "no column has the name qz"),
+        (names[1:], "no column with the name time"),
+        ([1, 2], "format: names of columns are wanted"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            rb.read_path(file, format=wrong)
+
+
+@pytest.mark.parametrize("form", ["R{}", "r{} [1]", "pose.r_{}"])
+def test_names_of_the_entries_of_a_matrix_are_known(tmp_path, form):
+    names = [form.format(f"{i}{j}") for j in (1, 2, 3) for i in (1, 2, 3)]  # by columns
+    numbers = [*P[:3, :3].T.ravel().tolist(), *P[:3, 3].tolist()]
+    text = f"t,{','.join(names)},x,y,z\n0,{','.join(map(str, numbers))}\n"
+    assert np.abs(rb.read_path(written(tmp_path, "a.csv", text))[1] - P).max() < 1e-15
 
 
 def test_times_in_a_second_file_are_exact(tmp_path):
