@@ -8,10 +8,12 @@ import pytest
 from packages import find_program
 
 from rbclassroom.assignments import sandbox
+from rbclassroom.assignments.tables import update
 from rbclassroom.course.lab import configure
 from rbclassroom.lecture.pdf import BROWSERS
 
 HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
 
 
 def sandbox_for(named):
@@ -87,6 +89,12 @@ def pytest_sessionstart(session):
     if hasattr(config, "workerinput") or config.option.collectonly:
         return
     paths = [here / word.partition("::")[0] for word in config.args]
+    if any(HERE in (path, *path.parents) or path in HERE.parents for path in paths):
+        for folder in sorted((ROOT / "notebooks/assignments/source").glob("*/")):
+            try:
+                update(folder)  # otherwise, in a new clone, each worker would do this
+            except ValueError as error:
+                raise pytest.UsageError(str(error)) from error
     for name, prepare in (("hostile", sandbox_for), ("browser", pages_for)):
         folder = HERE / name
         named = any(folder in (path, *path.parents) for path in paths)

@@ -46,13 +46,8 @@ def test_smoothing_splines_are_as_good_as_all_rivals_up_to_20_degrees_a_step():
 
 
 def test_stored_errors_are_those_of_the_motions():
-    """Medians of three motions differ from those of thirty by less than 40 %."""
-    columns = {}
-    for kind in rivals.MOTIONS:
-        for seed in range(3):
-            for name, x in rivals.errors_of_all(5, 1, kind, seed).items():
-                columns.setdefault(name, {}).setdefault(kind, []).append(x)
-    for name, kinds in columns.items():
-        medians = [np.median(x, axis=0) for x in kinds.values()]
-        mean = np.exp(np.mean(np.log(medians), axis=0))
-        assert rivals.stored()[5, 1][name] == pytest.approx(mean, rel=0.4), name
+    """With this seed, the errors of one motion of each kind differ from medians of 30 by 12 %."""
+    found = [rivals.errors_of_all(5, 1, kind, 0) for kind in rivals.MOTIONS]
+    for name, stored in rivals.stored()[5, 1].items():
+        mean = np.exp(np.mean(np.log([errors[name] for errors in found]), axis=0))
+        assert stored == pytest.approx(mean, rel=0.2), name
