@@ -248,7 +248,7 @@ def _solved(task: Task, given: Given) -> Optimum:
     _warn(rotation, lost, "did not converge", "their curves are NaN")
     beaten = ~np.asarray(rotation.converged) & ~lost
     why = "a curve that was tried costs less"
-    _warn(rotation, beaten, "may not have reached their optimum", why)
+    _warn(rotation, beaten, "may not have reached the optimum", why)
     if not given.path:
         return rotation
     path = np.stack(given.path, axis=-2)

@@ -2,7 +2,8 @@
 
 `configure` adds the steps to nbgrader's configuration, so that they also work in nbgrader's own
 commands and in the formgrader. A page of feedback shows a run without hidden tests: first the right
-answers, then those to look at again. HTML of students cannot run anything.
+answers, then those to look at again. HTML of students cannot run anything, and formulas are MathML,
+which browsers show without a script.
 """
 
 import html
@@ -15,10 +16,12 @@ import tempfile
 import time
 from pathlib import Path
 from typing import Any, cast
+from xml.etree import ElementTree
 
 import bleach
 import nbformat
 from jinja2 import pass_context
+from latex2mathml.converter import convert_to_element
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
 from nbconvert.exporters import HTMLExporter, NotebookExporter
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
@@ -48,7 +51,7 @@ TAGS |= {"th", "thead", "tr", "ul"}
 _CODED = re.compile(  # a character in decimal or hexadecimal code, below 1,000 or 256
     r"&(?:#0*([0-9]{1,3})(?![0-9]);?|#x0*([0-9a-f]{1,2})(?![0-9a-f]);?|bsol;)", re.IGNORECASE
 )
-_LINK = re.compile(r"\\href", re.IGNORECASE)  # a command of MathJax
+_LINK = re.compile(r"\\href", re.IGNORECASE)  # a command of MathJax, which the formgrader loads
 
 
 def configure(config: Config) -> None:
@@ -77,6 +80,7 @@ def configure(config: Config) -> None:
     # the feedback and the formgrader show HTML that cannot run anything
     config.HTMLExporter.sanitize_html = True
     filters = {"clean_html": "inert_html", "markdown2html": "inert_markdown"}
+    filters["page_markdown"] = "page_markdown"
     config.HTMLExporter.filters = {key: f"{__name__}.{f}" for key, f in filters.items()}
 
 
@@ -260,7 +264,7 @@ def _row(cells: list[NotebookNode], at: int, table: dict[str, Any]) -> dict[str,
         "score": marks["score"],
         "points": marks["points"],
         "waits": marks["waits"],
-        "said": [without_links(text[:600]) for text in said],
+        "said": [text[:600] for text in said],
         "read": table.get(slug, {}).get("read", ""),
         "comment": marks.get("comment") or "",
     }
@@ -322,8 +326,31 @@ def without_links(text: str) -> str:
     return _LINK.sub(r"\\text", _CODED.sub(letter, text))
 
 
+def mathml(tex: str, display: str) -> str:
+    """Return a formula as MathML, or as TeX if it is not understood.
+
+    Examples
+    --------
+    >>> mathml("x^2", "inline")
+    '<math display="inline"><mrow><msup><mi>x</mi><mn>2</mn></msup></mrow></math>'
+    """
+    try:
+        formula = convert_to_element(tex, display=display)
+    except Exception:  # the converter raises errors of many kinds
+        return f"<code>{html.escape(tex)}</code>"
+    for element in formula.iter():
+        element.text = html.unescape(element.text or "")  # symbols are written as codes
+        for name in ("class", "href", "id", "style", "xmlns"):
+            element.attrib.pop(name, None)
+    return ElementTree.tostring(formula, encoding="unicode")
+
+
 class _Renderer(IPythonRenderer):
     """Render Markdown; links and missing pictures become text with their addresses."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.formulas: list[str] = []
 
     def link(self, text: str, url: str, title: str | None = None) -> str:
         return f"{text} ({html.escape(url)})"
@@ -334,9 +361,31 @@ class _Renderer(IPythonRenderer):
         return str(super().image(text, url, title))
 
 
+class _PageRenderer(_Renderer):
+    """Store formulas as MathML, and mark their places by numbers between two private characters."""
+
+    def inline_math(self, body: str) -> str:
+        return self._place(mathml(body, "inline"))
+
+    def block_math(self, body: str) -> str:
+        return self._place(mathml(body, "block"))
+
+    def _place(self, formula: str) -> str:
+        self.formulas.append(formula)
+        return f"\ue000{len(self.formulas) - 1}\ue001"
+
+
 @pass_context
-def inert_markdown(context: Any, source: str) -> str:
+def inert_markdown(context: Any, source: str, kind: type[_Renderer] = _Renderer) -> str:
     """Return the HTML of Markdown without elements that run or load files."""
     attached = context.get("cell", {}).get("attachments", {})
-    renderer = _Renderer(escape=False, attachments=attached, exclude_anchor_links=True)
-    return inert_html(MarkdownWithMath(renderer=renderer).render(source))
+    renderer = kind(escape=False, attachments=attached, exclude_anchor_links=True)
+    plain = re.sub("[\ue000\ue001]", "", source)
+    page = inert_html(MarkdownWithMath(renderer=renderer).render(plain))
+    return re.sub("\ue000([0-9]+)\ue001", lambda found: renderer.formulas[int(found[1])], page)
+
+
+@pass_context
+def page_markdown(context: Any, source: str) -> str:
+    """Return the same HTML with formulas as MathML; nbgrader's formgrader would remove them."""
+    return inert_markdown(context, source, _PageRenderer)

@@ -270,16 +270,16 @@ def pages(course):
 
 def test_feedback_pages_contain_no_active_content_of_students(pages):
     for student, page in pages.items():
+        assert "<script" not in page, student
         body = page.split("<body>", 1)[1]
-        assert "<script" not in body, student
         tags = " ".join(re.findall(r"<[a-zA-Z][^>]*>", body))
         assert not re.search(r"\son\w+\s*=|javascript:|evil\.example|<(iframe|form|svg)", tags)
         loaded = re.findall(r"\s(?:src|href)=\"([^\"]*)\"", tags)
         assert all(address.startswith(("data:image/", "#")) for address in loaded), student
-        assert r"\href" not in html.unescape(body.split('class="notebook"')[0]), student
     words = pages["tells"]
-    for shown in (">A tiny set</h1>", "$a &lt; b$", PIXEL, r"$\text{https://evil.example}{x}$"):
+    for shown in (">A tiny set</h1>", PIXEL):
         assert shown in words
+    assert "<mi>a</mi><mo>&lt;</mo><mi>b</mi>" in re.sub(r"\s", "", words)
     assert r"\href" not in html.unescape(words)
     assert "gone (attachment:b.png is missing)" in words
 
