@@ -33,7 +33,14 @@ from traitlets import Bool, Integer
 from traitlets.config import Config
 
 from rbclassroom.assignments import sandbox
-from rbclassroom.assignments.locked_cells import is_answer, is_test, marks_of, name_cell, title_of
+from rbclassroom.assignments.locked_cells import (
+    blame,
+    is_answer,
+    is_test,
+    marks_of,
+    name_cell,
+    title_of,
+)
 from rbclassroom.assignments.marking import EMPTY
 from rbclassroom.assignments.notebook_runner import CUT, BoundedClient
 from rbclassroom.assignments.submissions import Refused, read_notebook, restore
@@ -237,7 +244,8 @@ class Summarise(nbgrader.NbGraderPreprocessor):
             failed = marks_of(cell)["points"] and not marks_of(cell)["score"]
             if failed and not any("ename" in output for output in cell.outputs):
                 cell.outputs.append(new_output("stream", name="stdout", text=UNSEEN))
-        rows = [_row(nb.cells, at, table) for at in graded]
+        wrong = list[str]()  # functions that failed above
+        rows = [_row(nb.cells, at, table, wrong) for at in graded]
         tests, words = ([row for row in rows if row["test"] == kind] for kind in (True, False))
         resources["summary"] = {
             "title": title_of(nb.cells, 0) or about["assignment"],
@@ -252,11 +260,15 @@ class Summarise(nbgrader.NbGraderPreprocessor):
         return nb, resources
 
 
-def _row(cells: list[NotebookNode], at: int, table: dict[str, Any]) -> dict[str, Any]:
+def _row(
+    cells: list[NotebookNode], at: int, table: dict[str, Any], wrong: list[str]
+) -> dict[str, Any]:
     marks = marks_of(cells[at])
     slug = str(marks["grade_id"]).removesuffix("-test")
     answers = [cell for cell in cells[:at] if marks_of(cell).get("grade_id") == f"{slug}-answer"]
     said = [text for cell in answers for text in _said(cell)] or _said(cells[at])
+    if is_test(cells[at]) and marks["score"] < marks["points"]:
+        said += [hint for cell in answers if (hint := blame(cell.source, wrong))]
     return {
         "name": marks["grade_id"],
         "title": _title(cells, at),

@@ -213,9 +213,8 @@ def _print_problems(notebook: NotebookNode, original: NotebookNode) -> list[bool
         elif is_test(cell):
             passed.append(not error and bool(cell.execution_count))
             if error:
-                called = [name for name in wrong if re.search(rf"\b{name}\(", source)]
-                wrong += re.findall(r"^def (\w+)", source, re.MULTILINE)
-                error += "".join(f" (It calls {name}: correct that first.)" for name in called[:1])
+                if hint := locked_cells.blame(source, wrong):
+                    error += f" ({hint})"
                 error += "".join(f" ({words}.)" for words in missing[:1])
             if error and (answered or at == ended):
                 found.append(("FAILED", f"{where} {error}"))

@@ -43,3 +43,10 @@ def name_cell(cells: list[NotebookNode], at: int) -> str:
     given = "answer" if is_answer(cell) else "test" if is_test(cell) else "locked cell"
     kind = given if grade_id(cell) else "added cell"
     return f"cell {at + 1}, {kind}" + f" of “{title}”" * bool(title)
+
+
+def blame(answer: str, wrong: list[str]) -> str:
+    """Return a hint if a wrong answer calls a wrong function; add its own functions to `wrong`."""
+    called = [name for name in wrong if re.search(rf"\b{name}\(", answer)]
+    wrong += re.findall(r"^def (\w+)", answer, re.MULTILINE)
+    return f"It calls {called[0]}: correct that first." if called else ""
