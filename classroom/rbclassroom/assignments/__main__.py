@@ -2,6 +2,7 @@
 
 import io
 import sys
+from collections import Counter
 from pathlib import Path
 
 from nbclient.exceptions import CellExecutionError
@@ -11,6 +12,7 @@ from rbclassroom.course import options
 from rbclassroom.course.folder import require_writable
 
 TASKS = "handout", "collect", "grade"
+TO_DO = "unmatched", "refused", "nothing usable", "not on the roster", "missing"
 
 
 def main() -> None:
@@ -38,6 +40,9 @@ def main() -> None:
                 for reason in dict.fromkeys(why for _, why in own):
                     same = (what for what, why in own if why == reason)
                     print(f"  {'; '.join(same)}: {reason}")
+            counts = Counter(kind for kind, *_ in rows)
+            if wanted := ", ".join(f"{counts[kind]} {kind}" for kind in TO_DO if counts[kind]):
+                print(f"Look at these: {wanted}. All rows are in submitted/report.csv.")
         else:
             from rbclassroom.assignments.handout import make_handout, make_solutions
 

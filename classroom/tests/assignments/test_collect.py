@@ -578,6 +578,7 @@ def test_the_command_prints_each_list(course, monkeypatch):
     folder = course.parents[1]
     (folder / "downloads" / "Ö X_1_assignsubmission_file_ps1.ipynb").write_bytes(answered(course))
     (folder / "downloads" / "notes.txt").write_bytes(b"")
+    (folder / "downloads" / "loose.ipynb").write_bytes(answered(course))
     both = dict.fromkeys((moodle("A_2"), moodle("B_3")), answered(course))
     (folder / "downloads" / "all.zip").write_bytes(packed(both))
     done = subprocess.run(
@@ -589,7 +590,8 @@ def test_the_command_prints_each_list(course, monkeypatch):
     )
     assert done.stderr == ""
     heads = [line for line in done.stdout.splitlines() if not line.startswith(" ")]
-    assert heads == ["collected: 3", "late, after 2000-01-01 12:00: 3", "ignored: 1"]
+    lists = ["collected: 3", "late, after 2000-01-01 12:00: 3", "unmatched: 1", "ignored: 1"]
+    assert heads == [*lists, "Look at these: 1 unmatched. All rows are in submitted/report.csv."]
     assert "  a, ps1; b, ps1: perhaps: 2026-11-20 12:00:00 may be the date" in done.stdout
     monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
     with pytest.raises(SystemExit, match="folder: an existing folder is wanted, got nowhere"):
