@@ -46,12 +46,12 @@ in place of arrays. Results are NumPy arrays in double precision; there is no au
 differentiation.
 
 An argument that is not finite, has the wrong shape or is outside the stated range raises a
-ValueError that names it. So does a matrix that is not symmetric or positive definite where this is
-required. Batch shapes that do not broadcast also raise ValueError. The docstrings name the other
-errors. Rotation matrices, poses and unit quaternions must be valid: a deviation of at most 1e-6, as
-of numbers in single precision, is removed by projection, and a larger one raises a ValueError that
-states it; `project_so`, `project_se` and `quaternion.project_quaternion` return the nearest valid
-arguments.
+ValueError that names it. So does a matrix that is not symmetric, to 1e-6 of its largest entry, or
+not positive definite where this is required. Batch shapes that do not broadcast also raise
+ValueError. The docstrings name the other errors. Rotation matrices, poses and unit quaternions must
+be valid: a deviation of at most 1e-6, as of numbers in single precision, is removed by projection,
+and a larger one raises a ValueError that states it; `project_so`, `project_se` and
+`quaternion.project_quaternion` return the nearest valid arguments.
 
 The line "Source" of a docstring cites the equations that the function implements. BK is Belta and
 Kumar (2002), and RR is the report by Samayamantula and Zou. A source such as "beyond BK 12" is an

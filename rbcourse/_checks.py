@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbcourse._numerics import EPS, Array
 
 Rng: TypeAlias = "np.random.Generator | int | None"  # in quotes, so numpy.random is not imported
+SINGLE = 1e-6  # numbers in single precision are exact to this, after a few operations
 
 
 def as_array(
@@ -64,13 +65,20 @@ def as_unit(name: str, value: ArrayLike, size: int) -> Array:
 
 
 def as_symmetric(name: str, value: ArrayLike, size: int | str) -> Array:
-    """Return square matrices; they must be symmetric up to 1e-12 times the largest entry."""
+    """Return square matrices; they must be symmetric up to single precision.
+
+    The matrices are replaced by their symmetric parts.
+    """
     half = as_finite(name, value, size, size) / 2  # so that nothing overflows
     mirrored = np.swapaxes(half, -1, -2)
     skew, largest = (np.abs(x).max(axis=(-2, -1)) for x in (half - mirrored, half))
-    crooked = skew > 1e-12 * largest
+    crooked = skew > SINGLE * largest
     if crooked.any():
-        raise ValueError(f"{first_index(name, crooked)} is not symmetric")
+        share = (skew[crooked] / largest[crooked]).flat[0]
+        raise ValueError(
+            f"{first_index(name, crooked)} is not symmetric: two entries differ by {share:.2g} "
+            f"of the largest one, and {SINGLE:g} is allowed"
+        )
     return half + mirrored
 
 
@@ -111,13 +119,15 @@ def as_time(
     """Append `batch_ndim` axes of length 1 to the times `t`, which must lie in the domain.
 
     A time that is outside the domain by at most 8 eps of the larger end is replaced by the nearer
-    end. The end of the domain is a number, or an array that broadcasts with the times.
+    end; eps is that of the type of `t`. The end of the domain is a number, or an array that broadcasts with the times.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
     if not _all((times >= start) & (times <= end)):
         times = as_finite("t", t)
         ends = np.broadcast_to(end, times.shape)
-        slack = 8 * EPS * np.maximum(abs(start), np.abs(ends))
+        given = np.asarray(t).dtype
+        eps = max(EPS, float(np.finfo(given).eps)) if given.kind == "f" else EPS
+        slack = 8 * eps * np.maximum(abs(start), np.abs(ends))
         outside = (times < start - slack) | (times > ends + slack)
         wanted = f"a time in [{start:.17g}, {ends[outside][0] if outside.any() else 1:.17g}]"
         check_all(~outside, "t", times, wanted)

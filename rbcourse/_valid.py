@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rbcourse._checks import as_array, as_finite, first_index
+from rbcourse._checks import SINGLE, as_array, as_finite, first_index
 from rbcourse._foam import Entries, cofactors, determinant
 from rbcourse._numerics import Array, blocks
 from rbcourse.projection import nearest
 
-ACCEPTED, REMOVED = 1e-9, 1e-6
+ACCEPTED, REMOVED = 1e-9, SINGLE
 _LAST_ROW = np.array([0.0, 0, 0, 1])
 
 

@@ -361,7 +361,8 @@ def _rotations(recording: Recording) -> Array:
     if (wrong := np.abs(norm - 1) > _TOLERANCE).any():
         i = np.argmax(wrong)
         raise ValueError(
-            f"{recording.place(i)}: a quaternion of norm 1 is wanted, got one of {norm[i]:.6g}"
+            f"{recording.place(i)}: a quaternion of norm 1 is wanted, got one of {norm[i]:.6g}; "
+            "format= may name the columns, if these are not the quaternion"
         )
     return matrix_from_quaternion(project_quaternion(q))
 

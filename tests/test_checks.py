@@ -3,6 +3,7 @@ import re
 import numpy as np
 import pytest
 
+import rbcourse as rb
 from rbcourse import _checks as checks
 
 EPS = np.finfo(float).eps
@@ -11,15 +12,26 @@ EPS = np.finfo(float).eps
 def test_nearly_symmetric_matrices_are_made_symmetric():
     given = np.array([[1, 2 + 1e-15], [2, 3]])
     assert np.array_equal(checks.as_symmetric("G", given, 2), [[1, 2 + 5e-16], [2 + 5e-16, 3]])
-    nearly = checks.as_symmetric("G", [[1, 1], [1 + 5e-13, 1]], 2)
+    nearly = checks.as_symmetric("G", [[1, 1], [1 + 9e-7, 1]], 2)
     assert np.array_equal(nearly, nearly.T)
     with pytest.raises(ValueError, match="G is not symmetric"):
         checks.as_symmetric("G", 1.5e308 * np.array([[1, 1], [-1, 1]]), 2)
     for scale in (1e-200, 1, 1e200):
-        bad = scale * np.array([np.eye(2), [[1, 1e-9], [0, 1]]])
-        with pytest.raises(ValueError, match=r"G\[1\] is not symmetric"):
+        bad = scale * np.array([np.eye(2), [[1, 1.1e-6], [0, 1]]])
+        with pytest.raises(ValueError, match=r"G\[1\] is not symmetric.* 1.1e-06 of"):
             checks.as_symmetric("G", bad, "n")
     assert not checks.as_symmetric("G", np.zeros((2, 2)), 2).any()
+
+
+def test_inertias_and_times_in_single_precision_are_accepted():
+    rng = np.random.default_rng(7)
+    for R in rb.sample_rotation(50, rng=rng).astype(np.float32):
+        inertia = R @ np.diag(rng.uniform(1, 2, 3).astype(np.float32)) @ R.T
+        assert np.abs(rb.Body(inertia).inertia - inertia).max() < 1e-6
+    for end in rng.uniform(0.1, 100, 50):
+        assert checks.as_time(np.float32([0, end]), 0, (0.0, end))[1] == pytest.approx(end)
+        with pytest.raises(ValueError, match="t"):
+            checks.as_time(np.float32(end * (1 + 2e-6)), 0, (0.0, end))
 
 
 def test_times_and_angles_just_outside_an_interval_are_moved_to_its_end():
