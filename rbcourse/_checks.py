@@ -119,7 +119,8 @@ def as_time(
     """Append `batch_ndim` axes of length 1 to the times `t`, which must lie in the domain.
 
     A time that is outside the domain by at most 8 eps of the larger end is replaced by the nearer
-    end; eps is that of the type of `t`. The end of the domain is a number, or an array that broadcasts with the times.
+    end; eps is that of the type of `t`. The end of the domain is a number, or an array that
+    broadcasts with the times.
     """
     times, (start, end) = as_array("t", t, copy=False), domain
     if not _all((times >= start) & (times <= end)):

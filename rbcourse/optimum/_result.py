@@ -186,9 +186,10 @@ class OptimalChain(Chain):
         body is symmetric about the axis of all rotations.
     c : ndarray, shape (N − 1, 3)
         The constant R p of each leg in the fixed frame.
-    residual, iterations, converged : float, int, bool
-        The largest residual of the legs, the number of steps of Newton's method, and True, since a
-        failure raises ConvergenceError.
+    residual, iterations : float, int
+        The largest residual of the legs, and the number of steps of Newton's method.
+    converged : bool
+        False if another leg with the same ends costs less, but no spline with this leg was found.
     """
 
     legs: Optimum

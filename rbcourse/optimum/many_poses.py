@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -24,11 +25,17 @@ from rbcourse.curves.velocities import (
     quaternion_system,
     spline_velocities,
 )
-from rbcourse.optimum._collocation import NODES, Failure, on_nodes
+from rbcourse.optimum._collocation import NODES, Failure, Solution, on_nodes
+from rbcourse.optimum._guesses import SAME
 from rbcourse.optimum._result import ConvergenceError, OptimalChain, OptimalMotion, optimum_of
+from rbcourse.optimum._search import body as of_body
+from rbcourse.optimum._search import cheapest
 from rbcourse.optimum._spline import Found, Problem, solve_spline
 from rbcourse.projection import nearest
+from rbcourse.so3 import log
 
+WINDING = 1.5  # rad: legs that turn by less were the cheapest ones [others turned by 2.4 or more]
+ROUNDS = 8  # of replacing legs by cheaper ones [of 160 splines, 14 needed 1 to 6]
 TOO_UNEVEN = "the poses may be too far apart, or the times between them too different"
 
 
@@ -63,6 +70,12 @@ def minimum_acceleration_spline(
     ------
     ConvergenceError
         If no minimum is found.
+
+    Warns
+    -----
+    RuntimeWarning
+        If, for a body, another leg with the same ends costs less, and no spline with this leg is
+        found. Then ``converged`` is False.
 
     Notes
     -----
@@ -208,6 +221,16 @@ def _spline(
     found = solve_spline(problem, curve)
     if isinstance(found, Failure):
         raise ConvergenceError(*found, TOO_UNEVEN)
+    converged, effort = True, problem.functional
+    if isinstance(effort, Effort):
+        found, converged = _with_cheaper_legs(problem, effort, found, ~_as_long(long, len(T)))
+    if not converged:
+        warnings.warn(
+            "the spline may not be the optimum: another leg between two of its poses costs less "
+            "(see converged)",
+            RuntimeWarning,
+            stacklevel=3,
+        )
     legs = optimum_of(problem.functional, problem.own(found.values), found.legs, T, body)
     return OptimalChain(
         duration=np.array(times[-1] - times[0]),
@@ -218,8 +241,43 @@ def _spline(
         cost=float(np.sum(legs.cost)),
         definite=found.shift < 0,
         residual=float(np.max(legs.residual)),
+        converged=converged,
         iterations=found.legs[0].iterations,
     )
+
+
+def _with_cheaper_legs(
+    problem: Problem, effort: Effort, found: Found, free: NDArray[np.bool_]
+) -> tuple[Found, bool]:
+    """Replace free legs by cheaper curves with the same ends, and solve again from this curve.
+
+    Newton's method finds a minimum near its start; for bodies, legs of another shape can cost less.
+    The second result tells whether no leg can be replaced any more.
+    """
+    for _ in range(ROUNDS):
+        ends = problem.own(found.values).swapaxes(0, 1)
+        turns = log(problem.R[:-1].mT @ problem.R[1:])
+        size = np.linalg.norm([turns, *ends], axis=-1).max(axis=0)
+        some = np.flatnonzero(free & (size > WINDING))
+        if not len(some):
+            return found, True
+        between = Ends(problem.R[some], problem.R[some + 1], *ends[:, some])
+        legs = cheapest(of_body(between, effort.G[some], of_torque=effort.of_torque))
+        cheaper = {
+            i: on_nodes(leg.R[None], NODES[2])
+            for i, leg in zip(some.tolist(), legs, strict=True)
+            if isinstance(leg, Solution) and leg.cost < (1 - SAME) * found.legs[i].cost
+        }
+        if not cheaper:
+            return found, True
+        curve = on_nodes(found.R, NODES[2])
+        for i, leg in cheaper.items():
+            curve[i] = leg[0]
+        again = solve_spline(problem, curve)
+        if isinstance(again, Failure) or again.cost >= (1 - SAME) * found.cost:
+            break
+        found = again
+    return found, False
 
 
 def _starting_curve(problem: Problem, long: NDArray[np.bool_]) -> Array:

@@ -41,7 +41,8 @@ class BoundedClient(NotebookClient):
         why = "the cell took too long; does a loop in the answer never end?"
         slow = {"ename": "TimeoutError", "evalue": why, "traceback": []}
         self.error_on_timeout, self.shutdown_kernel = slow, "immediate"
-        self.extra_arguments, self.record_timing = ["--log-level=CRITICAL"], False
+        limit = "--IPKernelApp.extra_extensions=rbclassroom.assignments.output_limit"
+        self.extra_arguments, self.record_timing = ["--log-level=CRITICAL", limit], False
 
     def reset_execution_trackers(self) -> None:
         """Reset the counts of time and output before a run."""

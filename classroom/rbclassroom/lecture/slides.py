@@ -74,6 +74,8 @@ class _Reader:
         self.sketches = path.parent / "slides" / f"{path.name[:2]}.svg"
         self.texts = texts_of(self.sketches.with_suffix(".md"), names)
         self.sheet = self.texts.pop(SHEET, "")
+        for name, text in self.texts.items():
+            check_formulas(f"slides/{path.name[:2]}.md, {name}", text)
         self.section = ""
         self.shown, self.behind = list[Slide](), list[Slide]()
         self.ahead = list[str]()  # notes for the next slide
@@ -99,12 +101,17 @@ class _Reader:
     def put_verdict(self, text: str) -> None:
         """Add the verdict of the last poll: the right option is not an item of the list."""
         poll = next(slide for slide in reversed(self.shown) if slide.kind == "poll")
-        for item, letter, idea in _ITEM.findall(text):
-            if letter not in poll.options:
-                listed = ", ".join(poll.options)
-                raise ValueError(f"slides: {poll.poll} has the options {listed}, got **{letter}**")
-            poll.ideas[letter] = idea
-            poll.right = poll.right if item else letter
+        found = _ITEM.findall(text)
+        if sorted(letter for _, letter, _ in found) != sorted(poll.options):
+            listed, got = ", ".join(poll.options), ", ".join(letter for _, letter, _ in found)
+            raise ValueError(f"slides: {poll.poll} has the options {listed}; its answer has {got}")
+        right = [letter for item, letter, _ in found if not item]
+        if len(right) != 1:
+            raise ValueError(
+                f"slides: {poll.poll} has one right option, the one without '-' before it; its "
+                f"answer has {', '.join(right) or 'none'}"
+            )
+        poll.ideas, poll.right = {letter: idea for _, letter, idea in found}, right[0]
         self.put(replace(poll, kind="verdict", notes=[]))
         poll.notes += [f"Right: **{poll.right}**.", text]
 
@@ -267,6 +274,16 @@ def texts_of(path: Path, names: Collection[str]) -> dict[str, str]:
         elif line.strip():
             raise ValueError(f"{where}: a line such as '## cell-04' is wanted before the text")
     return {name: text.strip() for name, text in texts.items()}
+
+
+def check_formulas(where: str, text: str) -> None:
+    """Refuse formulas whose braces or dollar signs do not match; a slide would show their TeX."""
+    text = re.sub(r"\\[{}$\\]", "", text)
+    for formula in re.findall(r"\$\$.+?\$\$|\$.+?\$", text, re.S):
+        if formula.count("{") != formula.count("}"):
+            raise ValueError(f"{where}: the braces of {formula:.60} do not match")
+    if text.count("$") % 2:
+        raise ValueError(f"{where}: a formula has only one $")
 
 
 def deck_of(path: Path) -> Deck:

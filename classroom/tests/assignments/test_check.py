@@ -17,6 +17,9 @@ from tiny_set import answered, cell, write_tiny_set
 from rbclassroom.assignments import check
 from rbclassroom.assignments.autograding import BoxedExecute
 from rbclassroom.assignments.locked_cells import grade_id
+from rbclassroom.assignments.notebook_runner import BoundedClient
+from rbclassroom.assignments.output_limit import TOO_MUCH
+from rbclassroom.course.notebooks import KERNEL
 
 
 @pytest.fixture
@@ -245,3 +248,16 @@ def test_errors_are_reported_even_if_their_output_is_lost():
     assert check._error(notebook.cells[0]) == "ZeroDivisionError: by zero"
     hint = new_output("error", ename="NotYet", evalue="x and y are swapped.", traceback=[])
     assert check._error(new_code_cell("1", outputs=[hint])) == "x and y are swapped."
+
+
+def test_a_cell_that_prints_without_end_is_stopped_by_the_size_of_its_output(tmp_path):
+    """Otherwise the text could fill the memory of the kernel before the time is over."""
+    loop = "for n in range(1, 10_000):\n    print('x' * 9_999)"
+    notebook = new_notebook(cells=[new_code_cell(loop), new_code_cell("print(n)")])
+    client = BoundedClient(notebook, kernel_name=KERNEL["name"])
+    client.folder = tmp_path
+    client.execute(cwd=str(tmp_path))
+    (printed, *_), (after,) = (cell.outputs for cell in notebook.cells)
+    assert any(TOO_MUCH in output.get("evalue", "") for output in notebook.cells[0].outputs)
+    assert len(printed.text) < 101_000
+    assert after.text == "1001\n"  # each line has 10,000 characters, and 10,000,000 are allowed

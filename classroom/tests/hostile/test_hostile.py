@@ -170,6 +170,7 @@ CLASS = [
     ("tells", write_words, {"square": TELLS}, "2 1", ""),
     ("forges", forge_remarks, {"square": LINKS}, "0 1", "cell 2, locked cell of “A tiny set” was"),
     ("takes", None, {"square": TAKES, "half": FORKS}, "0 0", f"{CELL_3}: takes too much memory"),
+    ("prints", None, {"square": FLOOD}, "0 1", None),
     ("loops", None, {"square": LOOP, "half": FLOOD}, "0 0", f"{CELL_3}: stopped after"),
     # the answer to the second problem returns points
     ("=cmd|' -C calc'!A0", None, {"square": EXITS, "half": "half = 1\n100.0"}, "0 0", ""),

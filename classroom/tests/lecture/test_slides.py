@@ -99,11 +99,31 @@ def test_a_text_without_a_cell_is_refused(tmp_path, texts, wrong):
         deck_of(path)
 
 
-@pytest.mark.parametrize("verdict", ["**E** All.\n\n- **A** None.", "**A** All.\n\n- **F** None."])
-def test_a_verdict_on_an_option_that_the_poll_does_not_have_is_refused(tmp_path, verdict):
+@pytest.mark.parametrize(
+    ("verdict", "wrong"),
+    [
+        ("**E** All.\n\n- **A** None.", "the options A, B; its answer has E, A"),
+        ("**B** All.\n\n- **B** None.", "the options A, B; its answer has B, B"),
+        ("**A** All.", "the options A, B; its answer has A"),
+        ("- **A** All.\n- **B** None.", "the one without '-' before it; its answer has none"),
+        ("**A** All.\n\n**B** None.", "the one without '-' before it; its answer has A, B"),
+    ],
+)
+def test_a_verdict_must_explain_each_option_once(tmp_path, verdict, wrong):
     poll = text("### Poll 1\n\nHow many?\n\n- **A** one\n- **B** two")
-    with pytest.raises(ValueError, match=r"Poll 1 has the options A, B, got \*\*[EF]\*\*"):
+    with pytest.raises(ValueError, match=re.escape(wrong)):
         tiny(tmp_path, poll, text("Answer.", verdict))
+
+
+@pytest.mark.parametrize(
+    ("formula", "wrong"),
+    [(r"$\frac{1 \det M = -1$", "the braces of"), ("$$x$$ and $y", "a formula has only one $")],
+)
+def test_formulas_that_cannot_be_typeset_are_refused(tmp_path, formula, wrong):
+    with pytest.raises(ValueError, match=re.escape(f"{wrong}")) as told:
+        tiny(tmp_path, text("Text.", f"It is {formula}."))
+    assert "slides/01.md, " in str(told.value)
+    tiny(tmp_path / "good", text("Text.", r"It is $\{x\}^{2}$, and costs \$5."))
 
 
 def test_a_picture_is_shown_with_the_text_of_its_cell(tmp_path):
