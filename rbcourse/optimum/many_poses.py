@@ -221,9 +221,10 @@ def _spline(
     found = solve_spline(problem, curve)
     if isinstance(found, Failure):
         raise ConvergenceError(*found, TOO_UNEVEN)
-    converged, effort = True, problem.functional
-    if isinstance(effort, Effort):
-        found, converged = _with_cheaper_legs(problem, effort, found, ~_as_long(long, len(T)))
+    converged = True
+    if isinstance(problem.functional, Effort):
+        free = ~_as_long(long, len(T))
+        found, converged = _with_cheaper_legs(problem, problem.functional, found, free)
     if not converged:
         warnings.warn(
             "the spline may not be the optimum: another leg between two of its poses costs less "
