@@ -12,7 +12,7 @@ from rbclassroom.course import options
 from rbclassroom.course.folder import require_writable
 
 TASKS = "handout", "collect", "grade"
-TO_DO = "unmatched", "refused", "nothing usable", "not on the roster", "missing"
+TO_DO = LISTS[LISTS.index("another set") :]
 
 
 def main() -> None:
@@ -40,7 +40,9 @@ def main() -> None:
                 for reason in dict.fromkeys(why for _, why in own):
                     same = (what for what, why in own if why == reason)
                     print(f"  {'; '.join(same)}: {reason}")
-            counts = Counter(kind for kind, *_ in rows)
+            # files of students without a usable file are not counted again
+            listed = "; ".join(why for kind, _, why in rows if kind == "nothing usable")
+            counts = Counter(kind for kind, what, _ in rows if f"{what}: " not in listed)
             if wanted := ", ".join(f"{counts[kind]} {kind}" for kind in TO_DO if counts[kind]):
                 print(f"Look at these: {wanted}. All rows are in submitted/report.csv.")
         else:

@@ -23,8 +23,9 @@ from rbclassroom.assignments.downloads import File, find_files, find_owners, wri
 from rbclassroom.assignments.submissions import count_found, count_written, read_notebook
 from rbcourse.files import replace_file
 
-LISTS = ["collected", "unchanged", "renamed", "late", "duplicates", "unmatched", "refused"]
-LISTS += ["ignored", "nothing usable", "not on the roster", "missing"]
+LISTS = ["collected", "unchanged", "renamed", "late", "duplicates", "ignored", "another set"]
+LISTS += ["unmatched", "refused", "nothing usable", "not on the roster", "missing"]
+NOT_OF_A_SET = "it is not a notebook of a handout; ask for the answers in a copy of the handout"
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
 Group = tuple[str, str, str]  # a set, a student, and the student's number or folder in the LMS
 Owner = tuple[str, str]  # the number and the name of a student in the LMS
@@ -58,6 +59,8 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         labels[who] = owner
         rows += [("duplicates", other.label, _why_not(other, best)) for other in others]
         rows.append(_take(best, submitted / who / name))
+        if best.why:
+            rows.append(("another set", f"{who}, {name}", best.why))
         if late := _why_late(best.about, due):
             rows.append(("late", f"{who}, {name}", late))
         if roster and who not in ids:
@@ -128,7 +131,7 @@ def _grouped(
         labels[label] = about["id"], about["name"]
         named = _named(Path(about["file"]).stem, sets)
         if file.kind or not name:
-            why = file.why or "it is not a notebook of a handout"
+            why = file.why or NOT_OF_A_SET
         else:
             if named and name not in named:
                 file.why = f"its name is {named[0]}, its cells are of {name}"

@@ -99,7 +99,8 @@ def _look(file: File, stream: IO[bytes], room: list[int], depth: int = 0) -> Ite
     except Exception as error:  # a damaged zip raises many kinds of errors
         file.kind, file.why = "refused", str(error) or type(error).__name__
         if isinstance(error, ValueError) and suffix not in (".ipynb", ".zip"):
-            file.kind, file.why = "ignored", "it is neither a notebook nor a zip"
+            script = "; ask for the notebook, .ipynb" if suffix == ".py" else ""
+            file.kind, file.why = "ignored", f"it is neither a notebook nor a zip{script}"
     yield file
 
 

@@ -22,7 +22,7 @@ from traitlets.config import Config
 from rbclassroom.assignments import downloads
 from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.autograding import configure
-from rbclassroom.assignments.collect import collect, read_owners, read_report
+from rbclassroom.assignments.collect import NOT_OF_A_SET, collect, read_owners, read_report
 from rbclassroom.assignments.submissions import read_notebook
 from rbclassroom.course import options
 
@@ -122,11 +122,13 @@ def test_each_notebook_is_assigned_to_its_problem_set(course):
     }
     rows = collected(course, given)
     assert [why for _, why in of("unmatched", rows)] == [
-        "it is not a notebook of a handout",
-        "it is not a notebook of a handout",
+        NOT_OF_A_SET,
+        NOT_OF_A_SET,
         "neither its name nor a folder names a student",
     ]
     assert "damaged or not a notebook" in of("refused", rows)[0][1]
+    other = ("f, ps2", "its name is ps1, its cells are of ps2")
+    assert of("another set", rows) == [other]
     wanted = {f"{who}/ps1" for who in "abcej"} | {"d/ps2", "f/ps2"}
     assert files(course).keys() == wanted
     assert dict(of("collected", rows))[moodle("F_1")].endswith(
@@ -580,6 +582,7 @@ def test_the_command_prints_each_list(course, monkeypatch):
     (folder / "downloads" / "notes.txt").write_bytes(b"")
     (folder / "downloads" / "loose.ipynb").write_bytes(answered(course))
     both = dict.fromkeys((moodle("A_2"), moodle("B_3")), answered(course))
+    both[moodle("C_4")] = b""
     (folder / "downloads" / "all.zip").write_bytes(packed(both))
     done = subprocess.run(
         [*MODULE, "rbclassroom.assignments", "collect", "downloads", "--due", "2000-01-01 12:00"],
@@ -590,8 +593,10 @@ def test_the_command_prints_each_list(course, monkeypatch):
     )
     assert done.stderr == ""
     heads = [line for line in done.stdout.splitlines() if not line.startswith(" ")]
-    lists = ["collected: 3", "late, after 2000-01-01 12:00: 3", "unmatched: 1", "ignored: 1"]
-    assert heads == [*lists, "Look at these: 1 unmatched. All rows are in submitted/report.csv."]
+    lists = ["collected: 3", "late, after 2000-01-01 12:00: 3", "ignored: 1", "unmatched: 1"]
+    lists += ["refused: 1", "nothing usable: 1"]
+    wanted = "1 unmatched, 1 nothing usable"
+    assert heads == [*lists, f"Look at these: {wanted}. All rows are in submitted/report.csv."]
     assert "  a, ps1; b, ps1: perhaps: 2026-11-20 12:00:00 may be the date" in done.stdout
     monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
     with pytest.raises(SystemExit, match="folder: an existing folder is wanted, got nowhere"):
