@@ -10,7 +10,7 @@ from rbcourse.curves.ends import Ends
 from rbcourse.optimum._collocation import relax
 from rbcourse.optimum._result import optimum_of
 from rbcourse.optimum._search import LIMITS, ball, body, jerk
-from rbcourse.optimum._second_variation import polynomials
+from rbcourse.optimum._second_variation import _share, polynomials
 from rbcourse.so3 import hat, vee
 
 pytestmark = pytest.mark.source("beyond BK 15")
@@ -177,3 +177,28 @@ def test_stationary_curves_with_short_costates_are_minima():
     short = np.linalg.norm(curves.c, axis=-1) < 2 * np.pi**3
     assert short.sum() > 20
     assert np.all(curves.certified[short])
+
+
+@pytest.mark.parametrize(
+    ("k", "part"), [(1, 0), (1, 1), (1, "c"), *((2, i) for i in (0, 1, 2, 3, "c"))]
+)
+def test_the_remainder_bounds_each_term_with_fewer_derivatives(k, part):
+    """Each term is above 0 for some of 300 functions, so it needs its part of the bound."""
+    rng, n, m = np.random.default_rng(4), 61, 1
+    nodes = grid(n)
+    weights, M = nodes.integral[-1], np.broadcast_to(I3, (n, 3, 3))
+    P, c = [0 * M for _ in range(2 * k)], np.zeros(3)
+    if part == "c":
+        c = np.array([0, 0, 2.0])
+    else:  # for odd derivatives, only the skew part contributes
+        P[part] = M if part % 2 == 0 else np.broadcast_to(hat(np.array([0, 0, 1.0])), (n, 3, 3))
+    share = _share([*P, M], np.linalg.norm(c), nodes, m + k)
+    derivatives = [values[:, m:] for values in polynomials(m + 4, k, n)]
+    ratios = []
+    for combination in rng.normal(size=(300, 4, 3)):
+        y = [values @ combination for values in derivatives]
+        turn = nodes.integral @ y[0] - weights @ y[0] / 2
+        force = sum((Pi @ x[..., None])[..., 0] for Pi, x in zip(P, y, strict=False))
+        term = weights @ np.sum(y[0] * (force - np.cross(c, turn)), axis=1)
+        ratios.append(abs(term) / (share * (weights @ np.sum(y[k] ** 2, axis=1))))
+    assert 1e-3 < max(ratios) <= 1

@@ -108,6 +108,14 @@ def test_full_turns_are_ignored_if_the_problem_says_so():
     assert "off by 6" in told(problem, turned.format(1, 0))
 
 
+@pytest.mark.parametrize("size", [0.1, 1, 1000])
+def test_results_agree_to_the_accuracy_of_the_problem(size):
+    problem, wanted = Problem(["x"], [], [], accuracy=1e-4), np.array([size, 0])
+    for share, same in ((0.5, True), (2, False)):
+        off = share * 1e-4 * max(1, size) * np.array([0, 1])
+        assert problem.same(wanted + off, wanted) is same
+
+
 T = [np.linspace(0, 1, 5), np.linspace(0, 2, 7)]
 LINE = Drawing(
     names=["t"],
