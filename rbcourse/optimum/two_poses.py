@@ -132,10 +132,11 @@ def minimum_torque(
     Notes
     -----
     The method, errors, warnings and singular set are those of `minimum_acceleration`. The curve of
-    a rod may not be the cheapest one, even if ``converged`` is True. For thin rods, the method often
-    does not converge, and may take minutes (docs/near_optimal.md has tests). A turn about a principal axis is a
-    stationary curve; about the axis of the largest moment of inertia, it may be a saddle. With J =
-    R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c (`rbcourse.textbook.minimum_torque`).
+    a rod may not be the cheapest one, even if ``converged`` is True. For thin rods, the method
+    often does not converge, and may take minutes (docs/near_optimal.md has tests). A turn about a
+    principal axis is a stationary curve; about the axis of the largest moment of inertia, it may be
+    a saddle. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c
+    (`rbcourse.textbook.minimum_torque`).
 
     Examples
     --------
