@@ -179,7 +179,8 @@ def figure_5(
     poses : array_like, shape (2, 4, 4), optional
         The poses at both ends.
     velocities : array_like, shape (2, 6), optional
-        The twists (ω, v) at both ends, in the body frame.
+        The twists (ω, v) at both ends, in the body frame. `twist_from_rates` makes them from
+        velocities in the fixed frame, such as those of the paper.
 
     Examples
     --------

@@ -29,7 +29,7 @@ OPTIONS: Mapping[str, tuple[tuple[int, ...], str]] = {
     "w0": ((3,), "the angular velocity at the start"),
     "w1": ((3,), "the angular velocity at the goal"),
     "poses": ((2, 4, 4), "two matrices, row by row"),
-    "velocities": ((2, 6), "two twists (w, v) in the body frame"),
+    "velocities": ((2, 6), "two twists (w, v): v = transposed R times the velocity"),
     "start": ((-1,), "x, y and the heading, or the joint angles, in m and rad"),
     "goal": ((-1,), "the same at the end"),
     "length": ((), "the length of the rectangle, in m"),
