@@ -91,6 +91,7 @@ _COUNTERS = "id", "name"
 """Names of columns that tell which of several bodies a row belongs to; in each row of one body, the
 last two may have another value."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_FEW = 0.05  # of the rows may be left out
 _MISSING = {"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"}
 _MISSING |= {"-nan(ind)", "1.#qnan"}
 _LOG = logging.getLogger("rbcourse.files")
@@ -197,13 +198,16 @@ def _increasing(
     ordered, last = dict[int, Decimal](), Decimal("-inf")
     dropped: dict[str, list[int]] = {"repeated": [], "unordered": []}
     constant = len(stamps) > 2 and len(set(stamps)) == 1
-    for i, stamp in zip(kept, stamps, strict=True):
+    for number, (i, stamp) in enumerate(zip(kept, stamps, strict=True)):
         if stamp > last:
             ordered[i] = last = stamp
             continue
         kind, why = ("repeated", "equal to") if stamp == last else ("unordered", "earlier than")
         if constant or kind not in skip:
             cure = f"skip={kind!r} leaves such rows out"
+            lost = sum(later <= last for later in stamps[number:])
+            if kind == "unordered" and lost > max(10, _FEW * len(stamps)):
+                cure = "the clock was set back, or the rows are in another order; split the file"
             if constant:
                 cure = "all times are equal, so they are not the times of the poses"
             raise ValueError(

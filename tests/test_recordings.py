@@ -230,6 +230,10 @@ REFUSED = {
         f"{EUROC.format('')}\n1403636580.838,{ROWS}\n1403636580.843,{ROWS}\n",
         "in ns, the steps of the times have the median 5e-12 s; unit= gives another unit",
     ),
+    "set_back.txt": (
+        "".join(f"{t / 10} {ROW}\n" for t in (*range(40), *range(20))),
+        "line 41: the time 0.0 is earlier .* the clock was set back, .* split the file",
+    ),
     "order_in_words.txt": (
         f"# t p(x,y,z) q(w,x,y,z)\n0 {ROWS.replace(',', ' ')}\n",
         "8 columns are not recognised in 'line 1: t p.*format='tum' reads",

@@ -186,6 +186,33 @@ def test_a_short_period_interpolates_and_a_long_one_gives_a_steady_turn():
     assert np.abs(c(T) - steady).max() < 1e-3
 
 
+def found_by_the_loop(times, poses):
+    loop = re.search(r"misses some::\n\n(.*?)\n\n", rb.smoothing_spline.__doc__, re.DOTALL)[1]
+    names = {"np": np, "times": times, "poses": poses} | vars(rb)
+    with warnings.catch_warnings(action="ignore"):
+        exec(dedent(loop), names)
+    return names["good"]
+
+
+@pytest.mark.parametrize("decimals", [3, 6])
+def test_the_loop_finds_wrong_poses_of_rounded_recordings_with_long_rests(decimals):
+    """Where a recording rests, rounded poses have no errors."""
+    t = np.linspace(0, 15, 1001)
+    x = np.sin(np.clip(t, 2, 5))[:, None] * [
+        0.5,
+        0.3,
+        1,
+        1,
+        2,
+        0.5,
+    ]  # moves for a fifth of the time
+    poses = rb.pose_from_coordinates(x.round(decimals))
+    poses[[200, 600, 700], :3, 3] += 0.05
+    wrong = np.flatnonzero(~found_by_the_loop(t, poses))
+    assert {200, 600, 700} <= {*wrong.tolist()}
+    assert len(wrong) < 100  # where the motion begins and ends, its acceleration jumps
+
+
 def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
     """The first poses accelerate, where natural ends do not follow them."""
     rng, t = np.random.default_rng(7), np.linspace(0, 10, 301)
@@ -196,12 +223,9 @@ def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
     poses[:, :3, 3] += 0.002 * rng.normal(size=(301, 3))
     poses[[20, 120, 121, 240], :3, :3] = Rotation.random(4, rng).as_matrix()
     poses[[70, 200], :3, 3] += 0.1
-    loop = re.search(r"in a step::\n\n(.*?)\n\n", rb.smoothing_spline.__doc__, re.DOTALL)[1]
-    names = {"np": np, "times": t, "poses": poses} | vars(rb)
-    with warnings.catch_warnings(action="ignore"):
-        exec(dedent(loop), names)
-    assert np.flatnonzero(~names["good"]).tolist() == [20, 70, 120, 121, 200, 240]
-    c = rb.smoothing_spline(t[names["good"]], poses[names["good"]])
+    good = found_by_the_loop(t, poses)
+    assert np.flatnonzero(~good).tolist() == [20, 70, 120, 121, 200, 240]
+    c = rb.smoothing_spline(t[good], poses[good])
     assert c.noise == pytest.approx([0.004, 0.002], rel=0.1)
     assert np.sqrt(np.mean(rb.angle_between(c(t)[:, :3, :3], true[:, :3, :3]) ** 2)) < 0.004
 

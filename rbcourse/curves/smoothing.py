@@ -133,18 +133,20 @@ def smoothing_spline(
     Moved rotations give the moved curve; reversed times reverse it. A pose of another point of the
     body is smoothed differently, since the origin is. Singular set: that of `quaternion_spline`.
 
-    A few wrong poses spoil the curve. This loop finds them, and then
-    ``times[good]`` and ``poses[good]`` are smoothed. For rotations, off is turn / median(turn). The
-    period of ten steps is for bodies that turn by less than 10° in a step::
+    A few wrong poses spoil the curve. This loop finds them, and then ``times[good]`` and
+    ``poses[good]`` are smoothed. For rotations, take ``turn`` alone. The period of ten steps is for
+    bodies that turn by less than 10° in a step; of more than ten wrong poses in a row, the loop
+    misses some::
 
         w, ten = np.ones(len(times)), 10 * np.median(np.diff(times))
         for _ in range(5):
             S = smoothing_spline(times, poses, period=ten, weights=w)(times)
             turn = angle_between(S[:, :3, :3], poses[:, :3, :3])
             move = np.linalg.norm(S[:, :3, 3] - poses[:, :3, 3], axis=1)
-            off = np.maximum(turn / np.median(turn), move / np.median(move))
-            w = np.minimum(1, 1.5 / off)
-        good = off < 5
+            # without poses at rest, whose errors may be 0, three quarters are nearer than 1
+            off = np.max([x / np.quantile(x[x > 1e-9], 0.75) for x in (turn, move)], axis=0)
+            w = 1.2 / np.clip(off, 1.2, 1e5)
+        good = off < 4
 
     Examples
     --------

@@ -37,6 +37,7 @@ from rbcourse.so3 import log
 WINDING = 1.5  # rad: legs that turn by less were the cheapest ones [others turned by 2.4 or more]
 ROUNDS = 8  # of replacing legs by cheaper ones [of 160 splines, 14 needed 1 to 6]
 TOO_UNEVEN = "the poses may be too far apart, or the times between them too different"
+TOO_DIFFERENT = ", or the principal moments too different"
 
 
 @described_by(spline_velocities)
@@ -220,7 +221,8 @@ def _spline(
         problem = problem._replace(functional=effort)
     found = solve_spline(problem, curve)
     if isinstance(found, Failure):
-        raise ConvergenceError(*found, TOO_UNEVEN)
+        is_body = isinstance(problem.functional, Effort)
+        raise ConvergenceError(*found, TOO_UNEVEN + TOO_DIFFERENT * is_body)
     converged = True
     if isinstance(problem.functional, Effort):
         free = ~_as_long(long, len(T))
