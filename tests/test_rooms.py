@@ -157,7 +157,7 @@ def test_files_are_written_by_one_function():
         for _, path in modules({name: folder})
         if writes(path.read_text("utf-8"))
     }
-    assert found == {"rbcourse/files.py", *IN_OTHER_FOLDERS}
+    assert found <= {"rbcourse/files.py", *IN_OTHER_FOLDERS}
 
 
 def clients():

@@ -24,7 +24,8 @@ from rbclassroom.assignments.submissions import count_found, count_written, read
 from rbcourse.files import replace_file
 
 LISTS = ["collected", "unchanged", "renamed", "late", "duplicates", "ignored", "another set"]
-LISTS += ["unmatched", "refused", "nothing usable", "not on the roster", "missing"]
+LISTS += ["fewer answers", "unmatched", "refused", "nothing usable", "not on the roster", "missing"]
+OWN = "source", "private", "release", "handouts", "submitted", "autograded", "feedback"
 NOT_OF_A_SET = "it is not a notebook of a handout; ask for the answers in a copy of the handout"
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
 Group = tuple[str, str, str]  # a set, a student, and the student's number or folder in the LMS
@@ -41,6 +42,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     """
     if not folder.is_dir():
         raise ValueError(f"folder: an existing folder is wanted, got {folder}")
+    _refuse_own_folders(folder.resolve(), assignments.resolve())
     sets, roster = _read_sets(assignments), _read_roster(assignments / "students.csv")
     submitted, owners = assignments / "submitted", read_owners(assignments)
     ids = {row["id"] for row in roster}
@@ -58,10 +60,16 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         owners[f"{who}/{name}"] = owner
         labels[who] = owner
         rows += [("duplicates", other.label, _why_not(other, best)) for other in others]
+        dates = [each.about["date"] for each in uploads if each.content == best.content]
+        dates += _date_of_same(best, submitted / who / name)
         rows.append(_take(best, submitted / who / name))
+        fuller = [other.label for other in others if _rank(other)[3] > _rank(best)[3]]
+        if fuller:
+            why = f"{fuller[-1]} is older and has more answers; look which one counts"
+            rows.append(("fewer answers", f"{who}, {name}", why))
         if best.why:
             rows.append(("another set", f"{who}, {name}", best.why))
-        if late := _why_late(best.about, due):
+        if late := _why_late(best.about | {"date": min(dates)}, due):
             rows.append(("late", f"{who}, {name}", late))
         if roster and who not in ids:
             rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
@@ -82,6 +90,25 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     replace_file(submitted / "owners.json", json.dumps(owners).encode())
     write_csv(submitted / "report.csv", lines or [{"list": "", "what": "", "why": "", "sets": ""}])
     return rows
+
+
+def _refuse_own_folders(folder: Path, assignments: Path) -> None:
+    """Refuse a folder in which sets, handouts or collected files would be taken for uploads."""
+    own = [assignments / name for name in OWN]
+    if folder in (assignments, *assignments.parents) or any(
+        path in (folder, *folder.parents) for path in own
+    ):
+        raise ValueError(
+            f"folder: a folder with nothing but downloads is wanted, got {folder}, which has files "
+            "of the course; move the downloads into a folder of their own"
+        )
+
+
+def _date_of_same(upload: File, place: Path) -> list[str]:
+    """Return the date of the collected file if it has the same content."""
+    target, stamp = place / f"{place.name}.ipynb", place / "timestamp.txt"
+    same = target.exists() and stamp.exists() and target.read_bytes() == upload.content
+    return [stamp.read_text("utf-8").strip()] if same else []
 
 
 def _still_holds(row: dict[str, str], names: list[str], seen: Collection[str]) -> bool:
@@ -117,6 +144,7 @@ def _grouped(
     unused = defaultdict[str, list[str]](list)  # the files of each student that are not used
     ids, usable = {row["id"] for row in roster}, set[str]()  # usable: students with a notebook
     files, rows, labels = list(find_files(folder)), list[Row](), dict[str, Owner]()
+    others = list[tuple[Row, list[tuple[str, str]]]]()  # with their sets and students
     for file in files:
         file.of_set = "" if file.kind else _set_of(file, sets)
     find_owners(files)
@@ -138,8 +166,14 @@ def _grouped(
             groups[name, student, about["id"] or about["folder"] or about["name"]].append(file)
             usable.add(label)
             continue
-        rows.append((file.kind or "unmatched", file.label, why))
+        row = file.kind or "unmatched", file.label, why
+        others.append((row, [(each, student) for each in named if file.kind != "ignored"]))
         unused[label].append(f"{file.label}: {why}")
+    have = {group[:2] for group in groups}
+    for (kind, what, why), wanted in others:
+        if have & {*wanted}:
+            kind, why = "duplicates", f"{why}; another file of the student is used"
+        rows.append((kind, what, why))
     for notebooks in groups.values():
         notebooks.sort(key=_rank)
     for who in sorted(unused.keys() - usable):

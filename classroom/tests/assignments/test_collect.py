@@ -121,11 +121,9 @@ def test_each_notebook_is_assigned_to_its_problem_set(course):
         "ps1.ipynb": one,
     }
     rows = collected(course, given)
-    assert [why for _, why in of("unmatched", rows)] == [
-        NOT_OF_A_SET,
-        NOT_OF_A_SET,
-        "neither its name nor a folder names a student",
-    ]
+    why_not = sorted(why for _, why in of("unmatched", rows))
+    unnamed = "neither its name nor a folder names a student"
+    assert why_not == [NOT_OF_A_SET, NOT_OF_A_SET, unnamed]
     assert "damaged or not a notebook" in of("refused", rows)[0][1]
     other = ("f, ps2", "its name is ps1, its cells are of ps2")
     assert of("another set", rows) == [other]
@@ -683,3 +681,43 @@ def test_rows_of_a_run_without_any_set_are_replaced(course):
     left = [(row["list"], row["what"]) for row in read_report(course)]
     assert ("nothing usable", "Bob 1") not in left
     assert ("nothing usable", "Carol 2") in left
+
+
+@pytest.mark.parametrize("place", [".", "source", "submitted", ".."])
+def test_folders_of_the_course_are_not_downloads(course, place):
+    (course / "submitted").mkdir(exist_ok=True)
+    with pytest.raises(ValueError, match="folder: a folder with nothing but downloads is wanted"):
+        collect(course / place, course)
+
+
+def test_the_same_file_in_a_later_download_is_not_late(course):
+    """Moodle gives all files the date of the download."""
+    folder, work = course.parents[1] / "downloads", answered(course)
+    for name, day in (("a", 20), ("b", 28)):
+        (folder / f"{name}.zip").write_bytes(
+            packed({moodle("A_1"): work}, (2026, 11, day, 12, 0, 0))
+        )
+        rows = collect(folder, course, datetime(2026, 11, 25))
+        assert of("late", rows) == []
+    (folder / "a.zip").unlink()
+    assert of("late", collect(folder, course, datetime(2026, 11, 25))) == []
+
+
+def test_a_newer_file_with_fewer_answers_is_named(course):
+    folder, full = course.parents[1] / "downloads", answered(course)
+    empty = (course / "source" / "ps1" / "ps1.ipynb").read_bytes()
+    (folder / "a.zip").write_bytes(packed({moodle("A_1"): full}, (2026, 11, 20, 12, 0, 0)))
+    (folder / "b.zip").write_bytes(packed({moodle("A_1"): empty}, (2026, 11, 22, 12, 0, 0)))
+    ((who, why),) = of("fewer answers", collect(folder, course))
+    assert who == "a, ps1"
+    assert "a.zip: A_1_assignsubmission_file/ps1.ipynb is older and has more answers" in why
+
+
+def test_a_damaged_file_is_no_longer_refused_if_there_is_a_good_one(course):
+    folder = course.parents[1] / "downloads"
+    (folder / "a.zip").write_bytes(packed({moodle("A_1"): b"{"}))
+    assert len(of("refused", collect(folder, course))) == 1
+    (folder / "b.zip").write_bytes(packed({moodle("A_1"): answered(course)}))
+    rows = collect(folder, course)
+    assert of("refused", rows) == of("nothing usable", rows) == []
+    assert "another file of the student is used" in of("duplicates", rows)[0][1]
