@@ -65,7 +65,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
         rows.append(_take(best, submitted / who / name))
         fuller = [other.label for other in others if _rank(other)[3] > _rank(best)[3]]
         if fuller:
-            why = f"{fuller[-1]} is older and has more answers; look which one counts"
+            why = f"{fuller[-1]} has more answers; look which one counts"
             rows.append(("fewer answers", f"{who}, {name}", why))
         if best.why:
             rows.append(("another set", f"{who}, {name}", best.why))
@@ -120,7 +120,8 @@ def _still_holds(row: dict[str, str], names: list[str], seen: Collection[str]) -
     sets, student = row["sets"].split(), row["what"].partition(", ")[0]
     if sets and not {*sets} & {*names}:
         return True
-    lasting = row["list"] in ("late", "nothing usable") or not sets
+    of_students = "late", "nothing usable", "fewer answers", "another set"
+    lasting = row["list"] in of_students or not sets
     return lasting and not {student, row["what"]} & {*seen}
 
 

@@ -710,7 +710,7 @@ def test_a_newer_file_with_fewer_answers_is_named(course):
     (folder / "b.zip").write_bytes(packed({moodle("A_1"): empty}, (2026, 11, 22, 12, 0, 0)))
     ((who, why),) = of("fewer answers", collect(folder, course))
     assert who == "a, ps1"
-    assert "a.zip: A_1_assignsubmission_file/ps1.ipynb is older and has more answers" in why
+    assert "a.zip: A_1_assignsubmission_file/ps1.ipynb has more answers" in why
 
 
 def test_a_damaged_file_is_no_longer_refused_if_there_is_a_good_one(course):
