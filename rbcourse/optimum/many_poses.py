@@ -64,8 +64,9 @@ def minimum_acceleration_spline(
     -------
     OptimalChain
         A `Chain` of optimal legs with the least `acceleration_cost` that Newton's method finds,
-        starting from `quaternion_spline`. w' (for a body, the torque) is continuous, and 0 at
-        natural ends. For poses, the centre of mass moves on a cubic spline.
+        starting from `quaternion_spline`; for a body, again with cheaper legs as long as there are
+        any. w' (for a body, the torque) is continuous, and 0 at natural ends. For poses, the centre
+        of mass moves on a cubic spline.
 
     Raises
     ------
