@@ -259,7 +259,9 @@ def to_number(place: str, cell: str) -> float:
     """Return a cell as a finite number, or raise a ValueError that names its place."""
     number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
-        date = "; convert dates to seconds" if re.match(r"\d{4}-\d\d-\d\d", cell) else ""
+        date = ""
+        if re.match(r"\d{4}-\d\d-\d\d", cell):
+            date = "; convert dates to seconds, or name their column '-' in format= and give times="
         raise ValueError(f"{place}: a finite number is wanted, got {cell[:40]!r}{date}")
     return number
 
@@ -465,7 +467,10 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
         raise ValueError(f"{rows.file}: positions in m, cm or mm are wanted, got {lengths}")
     time = units.get("time")
     if time not in (None, *DIGITS):
-        raise ValueError(f"{rows.file}: times in s, ms, us or ns are wanted, got {time!r}")
+        raise ValueError(
+            f"{rows.file}: times in s, ms, us or ns are wanted, got {time!r}; format= may name the "
+            "columns"
+        )
     unused = MATRIX if quaternions else ()
     columns = {meaning: i for meaning, [i] in found.items() if meaning not in unused}
     if form is not None:
@@ -524,13 +529,13 @@ def _check_times(rows: _Rows, columns: Columns, timed: bool) -> None:
     if timed and "time" in columns:
         raise ValueError(f"times, rate: {rows.file} has times, in column {columns['time'] + 1}")
     if not timed and "time" not in columns:
-        kind = "is a KITTI file, without times"
+        kind = "is a KITTI file, without times:"
         if rows.names:
-            listed = ", ".join(filter(None, rows.names))[:300]
-            kind = "has no column with the name time; "
-            kind += f"if one of {listed!r} is the time, format= names it"
+            listed = ", ".join(rows.names)[:300]
+            kind = "has no column with the name time. If one of the columns with the names "
+            kind += f"{listed!r} has the times, format= may be a list of names. Otherwise"
         raise ValueError(
-            f"{rows.file} {kind}: times= takes a file with a time in each line, or the times, and "
+            f"{rows.file} {kind} times= takes a file with a time in each line, or the times, and "
             "rate= the number of poses in a second"
         )
 

@@ -212,7 +212,7 @@ REFUSED = {
         f"time,a_pos_x,b_pos_x,y,z,qw,qx,qy,qz\n0,1,{ROWS}\n",
         "'a_pos_x' and 'b_pos_x' both name a column of x; rename one",
     ),
-    "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", "the name time; .*: times= takes"),
+    "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", "the name time. .* Otherwise times= takes"),
     "inches.csv": (f"time,x [in],y [in],z [in],qw,qx,qy,qz\n0,{ROWS}\n", "positions in m, cm or"),
     "minutes.csv": (f"time [min],x,y,z,qw,qx,qy,qz\n0,{ROWS}\n", "times in s, ms, us or ns"),
     "half_of_the_rates.csv": (f"{OWN},wx body [rad/s]\n0,{ROWS},1\n", "the name wy or wz or vx"),
