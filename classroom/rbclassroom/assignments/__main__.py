@@ -12,7 +12,7 @@ from rbclassroom.course import options
 from rbclassroom.course.folder import require_writable
 
 TASKS = "handout", "collect", "grade"
-TO_DO = LISTS[LISTS.index("another set") :]
+TO_DO = ["perhaps late", *LISTS[LISTS.index("another set") :]]
 
 
 def main() -> None:
@@ -43,6 +43,7 @@ def main() -> None:
             # files of students without a usable file are not counted again
             listed = "; ".join(why for kind, _, why in rows if kind == "nothing usable")
             counts = Counter(kind for kind, what, _ in rows if f"{what}: " not in listed)
+            counts["perhaps late"] = sum(why.startswith("perhaps") for _, _, why in rows)
             if wanted := ", ".join(f"{counts[kind]} {kind}" for kind in TO_DO if counts[kind]):
                 print(f"Look at these: {wanted}. All rows are in submitted/report.csv.")
         else:

@@ -47,7 +47,6 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
     submitted, owners = assignments / "submitted", read_owners(assignments)
     ids = {row["id"] for row in roster}
     groups, rows, labels = _grouped(folder, sets, roster)
-    rows += _namesakes(groups, submitted)
     for who in sorted(ids & {*labels}):  # also students without a usable file in this download
         for name in sets:
             rows += _renamed(f"{who}/{name}", labels[who], owners, assignments)
@@ -73,6 +72,7 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
             rows.append(("late", f"{who}, {name}", late))
         if roster and who not in ids:
             rows.append(("not on the roster", who, f"{best.about['name']} ({number})"))
+    rows += _namesakes(groups, submitted)
     names = sorted({name for name, *_ in groups})
     for name in names:
         for row in roster:

@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
 from typing import Any
 
 import numpy as np
@@ -32,7 +34,8 @@ def compare(
 
 def _error(function: Function, given: tuple[Any, ...], right: Array, measure: Function) -> str:
     try:
-        (result,) = call_student(function, given)
+        with redirect_stdout(StringIO()):
+            (result,) = call_student(function, given)
         return f"{np.abs(measure(result) - right).max():.0e}"
     except (NotYet, TypeError, ValueError) as problem:
         empty = str(problem) == EMPTY or "nothing is written" in str(problem)
@@ -45,7 +48,8 @@ def _time(function: Function, given: tuple[Any, ...]) -> str:
     while not times or time.perf_counter() < end:
         start = time.perf_counter()
         try:
-            call_student(function, given)
+            with redirect_stdout(StringIO()):  # students print in their functions
+                call_student(function, given)
         except NotYet:
             return "-"
         times.append(time.perf_counter() - start)

@@ -310,7 +310,8 @@ def grade_one(name: str, student: str, folder: Path, boxed: bool) -> list[str]:
         check_submission(folder / "submitted" / student / name, name, given)
         state, remarks = _graded(stored)
         if state != _state(job, folder, boxed):
-            remarks = _autograde(graded, config)
+            by_hand = _graded_by_hand(name, student, folder)
+            remarks = _autograde(graded, config, by_hand)
         done = run_step(GenerateFeedback, config)
         if not done["success"]:
             return [*remarks, f"no feedback was written: {last_line(done)}"]
@@ -329,8 +330,19 @@ def _graded(stored: Path) -> tuple[str, list[str]]:
     return state, remarks
 
 
-def _autograde(graded: Path, config: Config) -> list[str]:
-    before = _words(graded)
+def _graded_by_hand(name: str, student: str, folder: Path) -> set[str]:
+    """Return the ids of the answers of a submission that have points given by a person."""
+    database = folder / "gradebook.db"
+    if not database.exists():
+        return set()
+    with Gradebook(f"sqlite:///{database.resolve()}") as gradebook, suppress(MissingEntry):
+        grades = gradebook.find_submission_notebook(name, name, student).grades
+        return {grade.name for grade in grades if grade.manual_score is not None}
+    return set()
+
+
+def _autograde(graded: Path, config: Config, by_hand: set[str]) -> list[str]:
+    before = {key: words for key, words in _words(graded).items() if key in by_hand}
     done = run_step(Autograde, config)
     if not done["success"]:
         raise Refused(last_line(done))

@@ -188,8 +188,8 @@ def test_different_encodings_of_a_name_identify_one_student(course):
 def test_students_with_the_same_name_are_kept_apart(course):
     collected(course, {moodle("Al Li_11"): answered(course, "first")})
     rows = collected(course, {moodle("Al Li_22"): answered(course, "second")})
-    why = "2 students have this name, and now numbered folders; delete this one"
-    assert of("duplicates", rows) == [("submitted/al_li/ps1", why)]
+    assert of("renamed", rows) == [("submitted/al_li/ps1", "is al_li_11, ps1")]
+    assert of("duplicates", rows) == []
     found = files(course)
     assert found["al_li_11/ps1"] == "first"
     assert found["al_li_22/ps1"] == "second"
@@ -593,7 +593,7 @@ def test_the_command_prints_each_list(course, monkeypatch):
     heads = [line for line in done.stdout.splitlines() if not line.startswith(" ")]
     lists = ["collected: 3", "late, after 2000-01-01 12:00: 3", "ignored: 1", "unmatched: 1"]
     lists += ["refused: 1", "nothing usable: 1"]
-    wanted = "1 unmatched, 1 nothing usable"
+    wanted = "3 perhaps late, 1 unmatched, 1 nothing usable"
     assert heads == [*lists, f"Look at these: {wanted}. All rows are in submitted/report.csv."]
     assert "  a, ps1; b, ps1: perhaps: 2026-11-20 12:00:00 may be the date" in done.stdout
     monkeypatch.setattr(sys, "argv", ["assignments", "collect", "nowhere"])
