@@ -7,6 +7,7 @@ Formulas are MathML, which browsers show without a script.
 import html
 import json
 import re
+import secrets
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -189,28 +190,34 @@ class _Renderer(IPythonRenderer):
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
         self.formulas: list[str] = []
+        self.place = re.compile(rf"{secrets.token_hex(8)}-([0-9]+)-")  # no student can guess it
 
     def link(self, text: str, url: str, title: str | None = None) -> str:
         return f"{text} ({html.escape(url)})"
 
     def image(self, text: str, url: str, title: str | None = None) -> str:
+        text = self.place.sub("formula", text)  # a description cannot contain elements
         if url.startswith("attachment:") and url.partition(":")[2] not in self.attachments:
             return f"{text} ({html.escape(url)} is missing)"
         return str(super().image(text, url, title))
 
+    def with_formulas(self, page: str) -> str:
+        """Put the stored formulas into their places."""
+        return self.place.sub(lambda found: self.formulas[int(found[1])], page)
+
 
 class _PageRenderer(_Renderer):
-    """Store formulas as MathML, and mark their places by numbers between two private characters."""
+    """Store formulas as MathML, and mark their places."""
 
     def inline_math(self, body: str) -> str:
-        return self._place(mathml(body, "inline"))
+        return self._stored(mathml(body, "inline"))
 
     def block_math(self, body: str) -> str:
-        return self._place(mathml(body, "block"))
+        return self._stored(mathml(body, "block"))
 
-    def _place(self, formula: str) -> str:
+    def _stored(self, formula: str) -> str:
         self.formulas.append(formula)
-        return f"\ue000{len(self.formulas) - 1}\ue001"
+        return self.place.pattern.replace("([0-9]+)", str(len(self.formulas) - 1))
 
 
 @pass_context
@@ -218,9 +225,7 @@ def inert_markdown(context: Any, source: str, kind: type[_Renderer] = _Renderer)
     """Return the HTML of Markdown without elements that run or load files."""
     attached = context.get("cell", {}).get("attachments", {})
     renderer = kind(escape=False, attachments=attached, exclude_anchor_links=True)
-    plain = re.sub("[\ue000\ue001]", "", source)
-    page = inert_html(MarkdownWithMath(renderer=renderer).render(plain))
-    return re.sub("\ue000([0-9]+)\ue001", lambda found: renderer.formulas[int(found[1])], page)
+    return renderer.with_formulas(inert_html(MarkdownWithMath(renderer=renderer).render(source)))
 
 
 @pass_context

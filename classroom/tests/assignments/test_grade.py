@@ -27,7 +27,8 @@ from rbclassroom.assignments import sandbox
 from rbclassroom.assignments.__main__ import main
 from rbclassroom.assignments.autograding import configure
 from rbclassroom.assignments.collect import write_csv
-from rbclassroom.assignments.grade import grade, grade_one
+from rbclassroom.assignments.feedback import page_markdown
+from rbclassroom.assignments.grade import _graded_by_hand, grade, grade_one
 from rbclassroom.assignments.handout import read_config
 from rbclassroom.assignments.submissions import Refused
 
@@ -281,6 +282,29 @@ def test_grading_again_keeps_manual_scores_and_comments(again):
     assert not (again.folder / "feedback" / "nosy" / "ps0").exists()
     with again.gradebook() as gradebook:
         assert gradebook.find_submission("ps0", "nosy").score == 2.5
+
+
+def test_only_points_given_by_a_person_count_as_graded_by_hand(again):
+    found = {who: _graded_by_hand("ps0", who, again.folder) for who in ("tampers", "half right")}
+    assert found == {"tampers": {"words-answer"}, "half right": set()}
+    assert _graded_by_hand("ps0", "nobody", again.folder) == set()
+
+
+@pytest.mark.parametrize(
+    ("source", "shown"),
+    [
+        ("$x < y$", "<mi>x</mi><mo>&lt;</mo><mi>y</mi>"),
+        (r"$$\text{<script>}$$", "<mtext>&lt;script&gt;</mtext>"),
+        (r"$\href{javascript:f()}{x}$ $\style{position:fixed}{x}$", "<mi>x</mi>"),
+        ("![a $x$ b](data:image/png;base64,AA)", 'alt="a formula b"'),
+        ("&#xE000;5&#xE001; $x$", "<mi>x</mi>"),
+        (r"$\frac{1$ <b>1</b>", "<b>1</b>"),
+    ],
+)
+def test_formulas_become_mathml_that_does_nothing(source, shown):
+    page = page_markdown({}, source)
+    assert shown in page
+    assert not re.search("<script|javascript|position", page)
 
 
 def test_pages_are_packed_in_the_folders_of_a_download_from_moodle(again):

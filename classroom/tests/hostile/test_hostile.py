@@ -142,7 +142,7 @@ def write_words(notebook):
         "<script>alert(7)</script> [x](javascript:alert(8)) ![x](https://evil.example/x.png)\n"
         '<a href="https://evil.example">y</a> <img src=x onerror=alert(9)> $a < b$\n\n'
         r"$\href{https://evil.example}{x}$ $&#92;href{https://evil.example}{y}$ "
-        "![pasted](attachment:a.png) ![gone](attachment:b.png)\n\n"
+        "![pasted $x$](attachment:a.png) ![gone](attachment:b.png)\n\n"
         r"<p>$\h&#114;ef{https://evil.example}{z}$ $\hr&#x65;f{https://evil.example}{z}$</p>"
     )
     cell(notebook, "words-answer").attachments = {"a.png": {"image/png": PIXEL}}
