@@ -32,7 +32,9 @@ def as_array(
     """
     given = value if type(value) is np.ndarray else _array_of(name, value, *core)
     if given.dtype.kind not in "biuf":
-        raise ValueError(f"{name}: real numbers are wanted, got dtype {given.dtype}")
+        dates = f"; seconds are ({name} - {name}[0]) / np.timedelta64(1, 's')"
+        cure = dates if given.dtype.kind == "M" else ""
+        raise ValueError(f"{name}: real numbers are wanted, got dtype {given.dtype}{cure}")
     if not _has_core(given.shape, core) or (given.ndim > len(core) and not stacked):
         wanted = ", ".join([*["..."] * stacked, *map(str, core)])
         raise ValueError(f"{name}: shape ({wanted}) is wanted, got {given.shape}")

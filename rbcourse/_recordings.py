@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
+from datetime import datetime
 from decimal import Context, Decimal
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeAlias
@@ -51,7 +52,7 @@ _SPELLINGS = {
 _UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
 _MEANINGS = {
     "nanoseconds": r"(.*_)?(nsec|nsecs|nanosec|nanosecs|nanoseconds)",
-    "time": r"(.*_)?(time|times|timestamp|timestamps|stamp|t|ts|sec|secs|seconds)",
+    "time": r"(.*_)?(time|times|datetime|timestamp|timestamps|stamp|t|ts|sec|secs|seconds)",
     "": r"(((.*_)?(pose|pos|position|t|trans|translation|location)|(.*_)?p(_[a-z]{1,2}){0,2})_?)?"
     r"(?P<axis>[xyz])(_(p|pos|position))?",
     "q": r"((.*_)?(quat|quaternion|orientation|rot|rotation|attitude)|(.*_)?q(_[a-z]{1,2}){0,2})_?"
@@ -91,8 +92,10 @@ _COUNTERS = "id", "name"
 """Names of columns that tell which of several bodies a row belongs to; in each row of one body, the
 last two may have another value."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|[+-]\d\d:?\d\d)?", re.ASCII)
+"""A date with a time, as in ISO 8601: the second, its fraction, and the time zone."""
 _FEW = 0.05  # of the rows may be left out
-_MISSING = {"", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"}
+_MISSING = {"", "nan", "-nan", "nat", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"}
 _MISSING |= {"-nan(ind)", "1.#qnan"}
 _LOG = logging.getLogger("rbcourse.files")
 
@@ -145,7 +148,7 @@ def read_recording(
     rows = _read_rows(file, named)
     timed = times is not None or rate is not None
     if rows.names:
-        columns, stated, length = _named(rows, form)
+        columns, stated, length = _named(rows, form, unit)
     else:
         columns, stated, length = _unnamed(rows, form, timed), None, 1.0
     _check_times(rows, columns, timed)
@@ -153,6 +156,11 @@ def read_recording(
     if rate is not None and unit is not None:
         raise ValueError("unit: not with rate, which is in Hz")
     euroc = form == "euroc" or any(name.lower().startswith("p_rs_r") for name in rows.names)
+    dated = "time" in columns and bool(_DATE.fullmatch(rows.cells(0)[columns["time"]]))
+    if dated:
+        if unit is not None:
+            raise ValueError(f"unit: not with dates, which {rows.place(0)} has")
+        rows, stated = _with_seconds(rows, columns["time"]), "s"
     known = unit or stated or ("ns" if euroc else None)
     table = _numbers(rows, list(columns.values()))
     found = dict(zip(columns, table.T, strict=True))
@@ -255,15 +263,34 @@ def split_line(place: str, line: str, separator: str = ",") -> list[str]:
     return [cell.strip(" \t") for cell in row]
 
 
-def to_number(place: str, cell: str) -> float:
+def to_number(place: str, cell: str, hint: str = "") -> float:
     """Return a cell as a finite number, or raise a ValueError that names its place."""
     number = float(cell) if _NUMBER.fullmatch(cell) else np.nan
     if not np.isfinite(number):
-        date = ""
-        if re.match(r"\d{4}-\d\d-\d\d", cell):
-            date = "; convert dates to seconds, or name their column '-' in format= and give times="
-        raise ValueError(f"{place}: a finite number is wanted, got {cell[:40]!r}{date}")
+        raise ValueError(f"{place}: a finite number is wanted, got {cell[:40]!r}{hint}")
     return number
+
+
+def _seconds(cell: str) -> str:
+    """Return a date as the exact seconds since 1970, in UTC if it has no zone; or another cell."""
+    found = _DATE.fullmatch(cell.strip())
+    if not found:
+        return cell
+    second, fraction, zone = found.groups("")
+    with suppress(ValueError):  # of a day such as February 30
+        whole = Decimal(int(datetime.fromisoformat(second + (zone or "Z")).timestamp()))
+        return f"{EXACT.add(whole, Decimal(fraction or 0)):f}"
+    return cell
+
+
+def _with_seconds(rows: _Rows, column: int) -> _Rows:
+    """Return the rows with seconds in place of the dates in a column."""
+    texts = []
+    for text in rows.texts:
+        cells = text.split(rows.separator, column + 1)
+        cells[column : column + 1] = map(_seconds, cells[column : column + 1])
+        texts.append((rows.separator or " ").join(cells))
+    return rows._replace(texts=texts)
 
 
 def _read_rows(file: File, named: Sequence[str] | None) -> _Rows:
@@ -414,15 +441,20 @@ def _body(name: str) -> str:
     return next((word for word in words if not _KIND.fullmatch(word) and word not in _UNITS), "")
 
 
-def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
-    """Return the columns that have known names, the unit of time, and the lengths in a metre."""
+def _named(rows: _Rows, form: str | None, unit: str | None) -> tuple[Columns, str | None, float]:
+    """Return the columns that have known names, the unit of time, and the lengths in a metre.
+
+    The unit of time is the given one, or the one in the name of its column.
+    """
     found: dict[str, list[int]] = {}
     units: dict[str, str | None] = {}
     for i, name in enumerate(rows.names):
-        meaning, unit = _meaning(name)
+        meaning, named = _meaning(name)
         if meaning:
             found.setdefault(meaning, []).append(i)
-            units[meaning] = unit
+            units[meaning] = named
+    if "time" not in found and not rows.names[0] and _DATE.fullmatch(rows.cells(0)[0]):
+        found["time"] = [0]  # the index of pandas
     if "nanoseconds" in found and "time" not in found:
         found["time"], units["time"] = found.pop("nanoseconds"), "ns"
     if len(found.get("time", [])) > 1:  # messages of ROS have a stamp besides the time of receipt
@@ -465,11 +497,10 @@ def _named(rows: _Rows, form: str | None) -> tuple[Columns, str | None, float]:
     lengths = {units[name] or "m" for name in POSITION if name in found} or {"m"}
     if len(lengths) > 1 or not lengths <= LENGTHS.keys():
         raise ValueError(f"{rows.file}: positions in m, cm or mm are wanted, got {lengths}")
-    time = units.get("time")
+    time = unit or units.get("time")
     if time not in (None, *DIGITS):
         raise ValueError(
-            f"{rows.file}: times in s, ms, us or ns are wanted, got {time!r}; format= may name the "
-            "columns"
+            f"{rows.file}: times in s, ms, us or ns are wanted, got {time!r}; unit= gives the unit"
         )
     unused = MATRIX if quaternions else ()
     columns = {meaning: i for meaning, [i] in found.items() if meaning not in unused}
@@ -569,7 +600,9 @@ def _numbers(rows: _Rows, chosen: Sequence[int]) -> Array:
         cells = rows.cells(i)
         for k, column in enumerate(chosen):
             if cells[column].lower() not in _MISSING:
-                row[k] = to_number(f"{rows.place(i)}, {names[column]}", cells[column])
+                dated = re.search(r"\d[:/-]\d", cells[column])
+                hint = "; dates are read as in 2026-11-30T10:15:00.5" if dated else ""
+                row[k] = to_number(f"{rows.place(i)}, {names[column]}", cells[column], hint)
     return table
 
 

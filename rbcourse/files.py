@@ -176,7 +176,8 @@ def read_path(
         read. Further columns at the end are not read. By default, the content tells the format.
     unit : {"s", "ms", "us", "ns"}, optional
         The unit of the times in the file. By default, the name of the column tells it, EuRoC has
-        ns, and all others have s.
+        ns, and all others have s. Dates of ISO 8601, such as 2026-11-30 10:15:00.5+01:00, have no
+        unit, and become seconds since 1970; without a time zone, they are read as UTC.
     times : str, Path or array_like, shape (N,), optional
         For files without times: a file with one time in each line, or the times.
     rate : float, optional

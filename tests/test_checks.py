@@ -34,6 +34,14 @@ def test_inertias_and_times_in_single_precision_are_accepted():
             checks.as_time(np.float32(end * (1 + 2e-6)), 0, (0.0, end))
 
 
+def test_a_message_converts_dates_to_seconds():
+    times = np.array(["2026-03-01T10:00:00.5", "2026-03-01T10:00:02"], "datetime64[ms]")
+    with pytest.raises(ValueError, match=r"^times: .*; seconds are") as caught:
+        rb.chain(times, np.stack([np.eye(3)] * 2), np.zeros((2, 3)))
+    formula = str(caught.value).rpartition("seconds are ")[2]
+    assert eval(formula, {"times": times, "np": np}).tolist() == [0, 1.5]
+
+
 def test_times_and_angles_just_outside_an_interval_are_moved_to_its_end():
     assert checks.as_time([0, 1], 2).shape == (2, 1, 1)
     accumulated = np.cumsum(np.full(100, 0.07))  # the last time is 7.000000000000009

@@ -252,7 +252,8 @@ REFUSED = {
         f"t,child_frame_id,{OWN[9:]}\n0,odom,{ROWS}\n1,base,{ROWS}\n",
         r"child_frame_id has several values \(base, odom\)",
     ),
-    "dates.csv": (f"time,x,y,z,qw,qx,qy,qz\n2011-09-26 13:02:25,{ROWS}\n", "convert dates to"),
+    "dates.csv": (f"{OWN}\n09/26/2011 13:02,{ROWS}\n", "line 2, time.*as in 2026-11-30T10:15:00.5"),
+    "no_day.csv": (f"{OWN}\n2011-02-30 13:02:25,{ROWS}\n", "line 2, time.*'2011-02-30 13:02:25'"),
     "stamps.txt": (f"0 {ROW}\n" * 3, "all times are equal"),
     "lost.txt": (f"0 {ROW}\n1 NaN NaN NaN NaN NaN NaN NaN\n", "line 2: .* of x is.*skip='nan'"),
     "angles.csv": ("time,x,y,z,roll,pitch,yaw\n0,1,2,3,0,0,0\n", "no column.*matrix_from_zyx"),
@@ -361,6 +362,26 @@ def test_relative_times_are_rounded_once(tmp_path):
         exact = [float(Fraction(stamp) - 1755000000) for stamp in stamps]
         assert rb.read_path(file, unit=unit, start=1755000000)[0].tolist() == exact
         assert rb.read_path(file, unit=unit)[0].tolist() == list(map(float, stamps))
+
+
+@pytest.mark.parametrize("names", [OWN, OWN.replace("time [s]", "datetime"), OWN[8:]])
+def test_dates_are_exact_seconds_since_1970(tmp_path, names):
+    dates = {
+        "2026-03-29 01:59:59.123456789": "1774749599.123456789",
+        "2026-03-29T03:00:00.5+01:00": "1774749600.5",
+        "2026-03-29T02:00:01Z": "1774749601",
+        "2026-03-29 04:00:02+0200": "1774749602",
+        "NaT": None,
+    }
+    file = written(tmp_path, "a.csv", "\n".join([names, *(f"{d},{ROWS}" for d in dates)]) + "\n")
+    wanted = [Decimal(second) for second in dates.values() if second]
+    times, poses, _ = rb.read_path(file, start="first", skip="nan")
+    assert times.tolist() == [float(second - wanted[0]) for second in wanted]
+    assert np.abs(poses - P).max() < 1e-15
+    with pytest.raises(ValueError, match=r"^unit: not with dates, which .*line 2 has"):
+        rb.read_path(file, unit="s", skip="nan")
+    early = written(tmp_path, "b.csv", f"{names}\n1969-12-31 23:59:58.25,{ROWS}\n")
+    assert rb.read_path(early)[0] == [-1.75]
 
 
 def test_a_last_line_with_as_many_decimals_as_others_needs_no_line_end(tmp_path):
@@ -535,6 +556,13 @@ def test_columns_that_are_not_read_are_named_if_there_is_no_position(tmp_path, c
         assert poses.shape == (4, 3, 3)
         assert ("not read: north, east, down" in caplog.text) == said
         caplog.clear()
+
+
+def test_a_given_unit_replaces_that_of_the_name(tmp_path):
+    file = written(tmp_path, "a.csv", f"{OWN.replace('time [s]', 't [1]')}\n0.5,{ROWS}\n")
+    assert rb.read_path(file, unit="s")[0] == [0.5]
+    with pytest.raises(ValueError, match="got '1'; unit= gives the unit"):
+        rb.read_path(file)
 
 
 @pytest.mark.parametrize("units", ["[s],[mm],[mm],[mm],[1],[1],[1],[1]", "s,mm,mm,mm,-,-,-,-"])
