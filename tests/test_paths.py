@@ -27,8 +27,7 @@ both_groups = pytest.mark.parametrize("poses", [ROTATIONS, POSES], ids=["3", "4"
 
 def quintics(spline):
     """Return the chain of quintics with the velocities and accelerations of a spline."""
-    t, leg = spline.times, rb.projected_quintic
-    return rb.chain(t, spline(t), spline(t, 1), spline(t, 2), leg=leg)
+    return rb.chain(spline.times, *spline.state(spline.times))
 
 
 def resting(times, poses, **given):
@@ -244,7 +243,7 @@ UNEVEN = rb.geodesic(ROTATIONS[:-1], ROTATIONS[1:]).retimed(H)
         (rb.chain, ([0, 1], POSES[:2], TWISTS[:2], BENDS[:3]), "accelerations: shape (2, 6) is"),
         (SCREWS, (TIMES, POSES, TWISTS), "leg: a function that takes start, goal, v0, v1 and the"),
         (
-            rb.chain,
+            partial(rb.chain, leg=rb.projected_cubic),
             (TIMES, POSES, TWISTS, BENDS),
             "leg: a function that takes start, goal, v0, v1, a0",
         ),

@@ -20,7 +20,7 @@ from rbcourse._numerics import BLOCK, EPS, Array, blocks
 from rbcourse.body import Body
 from rbcourse.curves.closed import quaternion_cubic
 from rbcourse.curves.curve import Curve, Order, SingularTime, moved_rates
-from rbcourse.curves.projected import projected_cubic
+from rbcourse.curves.projected import projected_cubic, projected_quintic
 from rbcourse.curves.rigid import Joined, Position
 from rbcourse.curves.velocities import (
     PathEnds,
@@ -58,12 +58,13 @@ def chain(
     velocities : array_like, shape (N, 3) or (N, 6), optional
         Angular velocities or twists (ω, v) at the poses, in the body frame; required without `leg`.
     accelerations : array_like, shape (N, 3) or (N, 6), optional
-        Accelerations at the poses as ``c(t, 2)`` returns them, for quintic legs.
+        Accelerations at the poses as ``c(t, 2)`` returns them.
     leg : callable, optional
-        A function, by default `projected_cubic`, that returns a stack of two-point curves. It is
-        called once for all legs, as ``leg(start, goal, v0, v1, a0, a1, duration=...)``, without v0
-        and v1 (and a0 and a1) if no `velocities` (`accelerations`) are given. Without velocities,
-        legs of `geodesic` meet at corners, and legs of `projected_cubic` rest at all poses.
+        A function that returns a stack of two-point curves, by default `projected_cubic`, or
+        `projected_quintic` if accelerations are given. It is called once for all legs, as
+        ``leg(start, goal, v0, v1, a0, a1, duration=...)``, without v0 and v1 (and a0 and a1) if no
+        `velocities` (`accelerations`) are given. Without velocities, legs of `geodesic` meet at
+        corners, and legs of `projected_cubic` rest at all poses.
 
     Returns
     -------
@@ -105,7 +106,8 @@ def chain(
             raise ValueError("accelerations: not without velocities")
         rates.append(as_single("accelerations", accelerations, *velocities.shape))
     ends = [x for values in (poses, *rates) for x in (values[:-1], values[1:])]
-    legs = _made(leg or projected_cubic, ends, np.diff(times))
+    usual: Leg = projected_cubic if accelerations is None else projected_quintic
+    legs = _made(leg or usual, ends, np.diff(times))
     _check_arrival(legs, poses)
     return Chain(
         duration=np.array(times[-1] - times[0]),

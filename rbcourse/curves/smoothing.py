@@ -118,9 +118,9 @@ def smoothing_spline(
     RuntimeWarning
         If the body turns by more than 1 rad in the time period/2π, if an interval between two times
         is longer than the period and than five usual steps (the motion in this gap is not known;
-        smooth both sides apart), or if, without a given period, nothing is smoothed, or a pose is
-        ten times as far from the curve as half of the poses are, or if cross validation has fewer
-        than ten poses.
+        smooth both sides apart, and join them by `chain`), or if, without a given period, nothing
+        is smoothed, or a pose is ten times as far from the curve as half of the poses are, or if
+        cross validation has fewer than ten poses.
 
     Notes
     -----
