@@ -15,7 +15,7 @@ angles : array_like, shape (n,), optional
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Literal
 
@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from rbcourse._checks import as_single, check_all
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array
-from rbcourse._valid import as_poses
+from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts
 from rbcourse.curves.projected import projected_cubic
 from rbcourse.draw import bodies, coordinates, families
 from rbcourse.draw.drawing import Drawing, run, style
@@ -40,10 +40,7 @@ __all__ = ["figure_1", "figure_2", "figure_3", "figure_4", "figure_5"]
 
 ANGLES = np.arange(1, 23) * np.pi / 24
 SIGMA = np.pi / 6 * np.array([1.0, 2, 3])
-POSES = np.stack(
-    [np.eye(4), pose_from_coordinates([np.pi / 6, 2 * np.pi / 3, np.pi / 2, 8, 10, 12])]
-)
-VELOCITIES = twist_from_rates(POSES, [[1, 2, 3], [2, 1, 1]], [[1, 1, 1], [1, 5, 3]])
+SIGMA_5 = np.pi / 6 * np.array([1.0, 4, 3])
 _EXTRA = {"a": 0.0, "b": 1.0, "c": 5.0}
 """The differences between the end velocity and σ along the first axis, in BK (21)."""
 
@@ -157,7 +154,8 @@ def figure_4(
     with style():
         fig = plt.figure(figsize=(8, 3.7))
         coordinates.draw_comparison(fig, data)
-    said = f"Case ({panel}): {coordinates.describe_coordinates(data)}"
+    costs = [float(acceleration_cost(curve)) for curve in curves.values()]
+    said = f"Case ({panel}): {coordinates.describe_coordinates(data)} {_compared(costs)}"
     return Drawing(fig, f"paper_fig4{panel}", data, said)
 
 
@@ -165,8 +163,12 @@ def figure_4(
 def figure_5(
     panel: Literal["a", "b"] = "a",
     *,
-    poses: ArrayLike = POSES,
-    velocities: ArrayLike = VELOCITIES,
+    sigma: ArrayLike = SIGMA_5,
+    d: ArrayLike = (8, 10, 12),
+    w0: ArrayLike = (1, 2, 3),
+    w1: ArrayLike = (2, 1, 1),
+    d0_dot: ArrayLike = (1, 1, 1),
+    d1_dot: ArrayLike = (1, 5, 3),
 ) -> Drawing:
     """Draw a cube that moves along the optimum (a), or along the projected cubic (b).
 
@@ -176,24 +178,28 @@ def figure_5(
 
     Parameters
     ----------
-    poses : array_like, shape (2, 4, 4), optional
-        The poses at both ends.
-    velocities : array_like, shape (2, 6), optional
-        The twists (ω, v) at both ends, in the body frame. `twist_from_rates` makes them from
-        velocities in the fixed frame, such as those of the paper.
+    sigma, d : array_like, shape (3,), optional
+        The rotation vector of the goal in rad, and its position in m. The start is I and 0.
+    w0, w1 : array_like, shape (3,), optional
+        The angular velocities at both ends, in the body frame.
+    d0_dot, d1_dot : array_like, shape (3,), optional
+        The velocities of the centre at both ends, in the fixed frame.
 
     Examples
     --------
-    >>> drawing = figure_5("b", velocities=np.zeros((2, 6)))  # from rest to rest
+    >>> rest = {name: [0, 0, 0] for name in ("w0", "w1", "d0_dot", "d1_dot")}
+    >>> drawing = figure_5("b", **rest)
     >>> drawing.data["x [m]"].shape
     (106,)
     >>> plt.close(drawing.figure)
     """
     _one_of("panel", panel, "ab")
-    ends = as_poses("poses", poses), as_single("velocities", velocities, 2, 6)
-    if ends[0].shape != (2, 4, 4):
-        raise ValueError(f"poses: shape (2, 4, 4) is wanted, got {ends[0].shape}")
-    best, near = (make(*ends[0], *ends[1]) for make in (minimum_acceleration, projected_cubic))
+    given = {"sigma": sigma, "d": d, "w0": w0, "w1": w1, "d0_dot": d0_dot, "d1_dot": d1_dot}
+    vectors = {name: as_single(name, vector, 3) for name, vector in given.items()}
+    poses = pose_from_coordinates([np.zeros(6), np.append(vectors["sigma"], vectors["d"])])
+    w, d_dot = ([vectors[name] for name in names] for names in (["w0", "w1"], ["d0_dot", "d1_dot"]))
+    ends = *poses, *twist_from_rates(poses, w, d_dot)
+    best, near = minimum_acceleration(*ends), projected_cubic(*ends)
     motion, t = best if panel == "a" else near, np.linspace(0, 1, 106)
     drawn = t[::15]
     shown = motion(drawn)
@@ -209,8 +215,20 @@ def figure_5(
         "b": "Projection: the same cube; it has pink edges, and outlines of the optimum are "
         "black at the middle four times. ",
     }
-    alt = said[panel] + bodies.describe_cube_motion(shown)
+    rotation, moving = np.transpose([acceleration_cost_parts(best), acceleration_cost_parts(near)])
+    costs = f"{_compared(rotation)} The translation costs {moving[0]:.6g}."
+    alt = f"{said[panel]}{bodies.describe_cube_motion(shown)} {costs}"
     return Drawing(fig, f"paper_fig5{panel}", bodies.motion_table(t, motion, drawn), alt)
+
+
+def _compared(costs: Sequence[float]) -> str:
+    """Return a sentence about the costs of the rotation: the optimum's and the projection's."""
+    best, near = np.round(costs, 12).tolist()
+    more = f", {100 * (near / best - 1):.3g} % more" if 0 < best < near else ""
+    return (
+        f"The optimal rotation costs {best:.6g} (the integral of 2‖ω'‖²), "
+        f"the projected one {near:.6g}{more}."
+    )
 
 
 def _grid(angles: ArrayLike) -> tuple[Array, Array]:

@@ -52,10 +52,16 @@ def test_one_argument_changes_a_figure():
     assert np.abs(v0 - rb.sample_rotation(100, rng=7)[:, :, 2]).max() < 1e-15
     data = paper.figure_2("b", angles=[0.5, 1, 2]).data
     assert np.array_equal(np.unique(data["angle [rad]"]), [0.5, 1, 2])
-    rest = paper.figure_5("b", velocities=np.zeros((2, 6))).data
-    curve = rb.projected_cubic(*paper.POSES, *np.zeros((2, 6)))
-    places = np.stack([rest[f"{x} [m]"] for x in "xyz"], axis=-1)
-    assert np.abs(places - curve(rest["t [1]"])[:, :3, 3]).max() < 1e-12
+    ends = [np.eye(4), rb.pose_from_coordinates([0.3, 0, 1, 2, 1, 0])]
+    rates = {"w0": [1, 0, 0], "w1": [0, 1, 0], "d0_dot": [0, 0, 2], "d1_dot": [3, 0, 0]}
+    drawing = paper.figure_5("b", sigma=[0.3, 0, 1], d=[2, 1, 0], **rates)
+    twists = rb.twist_from_rates(ends, [[1, 0, 0], [0, 1, 0]], [[0, 0, 2], [3, 0, 0]])
+    curve = rb.projected_cubic(*ends, *twists)
+    places = np.stack([drawing.data[f"{x} [m]"] for x in "xyz"], axis=-1)
+    assert np.abs(places - curve(drawing.data["t [1]"])[:, :3, 3]).max() < 1e-12
+    rotation, moving = rb.acceleration_cost_parts(curve)
+    assert f"the projected one {rotation:.6g}" in drawing.alt
+    assert f"translation costs {moving:.6g}." in drawing.alt
     route = report.figure_7(plan=[([1, 0, 0], 1), ([0, 1, 1], 0.55)]).data
     assert len(route["x [m]"]) == 1 + 10 + 6
     assert [float(x[-1]) for x in route.values()] == pytest.approx([1, 0.55, 0.55])
@@ -67,7 +73,7 @@ def test_one_argument_changes_a_figure():
         (paper.figure_2, {"panel": "c"}, "panel: one of 'a', 'b' is wanted, got 'c'"),
         (paper.figure_3, {"angles": [1, 4]}, "angles.1. is 4.0, an angle above 0 and below π"),
         (paper.figure_4, {"w1": [1, 2]}, "w1: shape"),
-        (paper.figure_5, {"poses": np.eye(4)}, "poses: shape"),
+        (paper.figure_5, {"d0_dot": 1}, "d0_dot: shape"),
         (
             paper.figure_4,
             {"sigma": [180, 0, 0]},
@@ -85,7 +91,9 @@ def test_bad_arguments_are_named(draw, options, message):
 def test_the_command_draws_figures_into_files(tmp_path, capsys):
     words = ["--w1", "0.5", "-1e0", "7", "4c", "--folder", str(tmp_path / "mine")]
     run("rbcourse.paper", paper.FIGURES, words)
-    assert "paper_fig4c: png, pdf, csv" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "paper_fig4c: png, pdf, csv" in said
+    assert "The optimal rotation costs" in " ".join(said.split())
     files = sorted(path.name for path in (tmp_path / "mine").iterdir())
     assert files == ["paper_fig4c.csv", "paper_fig4c.pdf", "paper_fig4c.png"]
     written = (tmp_path / "mine" / "paper_fig4c.csv").read_text("utf-8")
@@ -98,7 +106,7 @@ def test_the_command_draws_figures_into_files(tmp_path, capsys):
         "6 --folder x": "FIGURE: one of 1, 2a, .*5b or all is wanted, got 6",
         "2a --w1 1 2 3": "figure 2a has no option --w1",
         "4c --w1 1 2": "argument --w1: expected 3 arguments",
-        "5a --velocities 1 2 3": "--velocities: 12 numbers are wanted, got 3",
+        "5a --d0_dot 1 2": "argument --d0_dot: expected 3 arguments",
         "2a --angles 1": "angles: two or more increasing",
     }.items():
         with pytest.raises(SystemExit):

@@ -4,15 +4,14 @@ import argparse
 import inspect
 import re
 import sys
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
-import numpy as np
 from matplotlib.figure import Figure
 
 from rbcourse.draw.animate import Animation, Update, frame_picture, render, save_animation
@@ -21,22 +20,23 @@ from rbcourse.draw.save import Picture, Table, as_png, csv_text, save_figure, wr
 from rbcourse.optimum import ConvergenceError
 
 _NEGATIVE = re.compile(r"-[\d.]+(e[+-]?\d+)?", re.I)
-OPTIONS: Mapping[str, tuple[tuple[int, ...], str]] = {
-    "angles": ((-1,), "two or more increasing angles, in rad"),
-    "rotation": ((3,), "the rotation vector of the moving frame, in rad"),
-    "position": ((3,), "the origin of the moving frame, in m"),
-    "sigma": ((3,), "the rotation vector of the goal, in rad"),
-    "w0": ((3,), "the angular velocity at the start"),
-    "w1": ((3,), "the angular velocity at the goal"),
-    "poses": ((2, 4, 4), "two matrices, row by row"),
-    "velocities": ((2, 6), "two twists (w, v): v = transposed R times the velocity"),
-    "start": ((-1,), "x, y and the heading, or the joint angles, in m and rad"),
-    "goal": ((-1,), "the same at the end"),
-    "length": ((), "the length of the rectangle, in m"),
-    "rng": ((), "the seed of the sample"),
-    "steps": ((), "the number of rotations, or of steps"),
+OPTIONS: Mapping[str, tuple[int | str | None, str]] = {
+    "angles": ("+", "two or more increasing angles, in rad"),
+    "rotation": (3, "the rotation vector of the moving frame, in rad"),
+    "position": (3, "the origin of the moving frame, in m"),
+    "sigma": (3, "the rotation vector of the goal, in rad"),
+    "w0": (3, "the angular velocity at the start, in the body frame"),
+    "w1": (3, "the angular velocity at the goal, in the body frame"),
+    "d": (3, "the position of the goal, in m"),
+    "d0_dot": (3, "the velocity at the start, in the fixed frame"),
+    "d1_dot": (3, "the velocity at the goal, in the fixed frame"),
+    "start": ("+", "x, y and the heading, or the joint angles, in m and rad"),
+    "goal": ("+", "the same at the end"),
+    "length": (None, "the length of the rectangle, in m"),
+    "rng": (None, "the seed of the sample"),
+    "steps": (None, "the number of rotations, or of steps"),
 }
-"""The shape and the meaning of each option of the command."""
+"""The count of numbers of each option of the command, as in argparse, and its meaning."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -115,12 +115,11 @@ def run(
     )
     parser.add_argument("--folder", default=".", help="the folder of the files (default: this one)")
     for name in sorted({name for names in options.values() for name in names}):
-        shape, meaning = OPTIONS[name]
+        count, meaning = OPTIONS[name]
         known = ", ".join(figure for figure, names in options.items() if name in names)
-        kind: dict[str, Any] = {"type": int if name in ("rng", "steps") else float}
-        if shape:
-            kind["nargs"] = 3 if shape == (3,) else "+"
-        parser.add_argument(f"--{name}", metavar="X", help=f"{meaning} ({known})", **kind)
+        number = int if name in ("rng", "steps") else float
+        told = f"{meaning} ({known})"
+        parser.add_argument(f"--{name}", type=number, nargs=count, metavar="X", help=told)
     # numbers such as -1e-3 are no options; with a space before them, argparse knows this
     words = sys.argv[1:] if words is None else words
     spaced = [f" {word}" if _NEGATIVE.fullmatch(word) else word for word in words]
@@ -136,11 +135,13 @@ def run(
         try:
             if other := values.keys() - options[name]:
                 raise ValueError(f"figure {name} has no option --{min(other)}")
-            drawing = draw(**{key: _shaped(key, value) for key, value in values.items()})
+            drawing = draw(**values)
             drawing.write(folder)
         except (ValueError, OSError, ConvergenceError) as error:
             parser.error(str(error))
         print(f"{Path(folder, drawing.name)}: png, pdf, csv", flush=True)
+        if "all" not in asked:
+            print(textwrap.indent(textwrap.fill(drawing.alt, 96), "    "), flush=True)
 
 
 def _options(draw: Callable[..., Drawing]) -> set[str]:
@@ -152,10 +153,3 @@ def _options(draw: Callable[..., Drawing]) -> set[str]:
         for p in parameters
         if p.kind == p.KEYWORD_ONLY and p.name not in fixed and p.name != "plan"
     }
-
-
-def _shaped(name: str, value: Any) -> Any:
-    shape, _ = OPTIONS[name]
-    if shape and -1 not in shape and len(value) != (count := int(np.prod(shape))):
-        raise ValueError(f"--{name}: {count} numbers are wanted, got {len(value)}")
-    return np.reshape(value, shape) if shape else value
