@@ -27,6 +27,10 @@ from rbclassroom.assignments.marking_samplers import LAWS, quantiles
 from rbcourse.files import replace_file
 
 DRAWS = 5000
+KEPT = "law", "accuracy", "angles", "read"
+"""The names in the table of a problem whose values go into the data of the set as they are."""
+NAMES = {*KEPT, "inputs", "keep"}
+"""The names that the table of a problem may have besides `mistakes`."""
 
 
 def update(folder: Path) -> None:
@@ -65,6 +69,7 @@ def _problems(path: Path, notebook: Path) -> dict[str, dict[str, Any]]:
         twins.alone = False
     found, own = {}, table.pop("own", "")
     for slug, problem in table.items():
+        _check_names(path.name, slug, problem)
         try:
             found[slug] = {"own": own, **_evaluate(problem, cells[f"{slug}-answer"], space)}
         except Exception as error:
@@ -72,9 +77,21 @@ def _problems(path: Path, notebook: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
+def _check_names(file: str, slug: str, problem: dict[str, Any]) -> None:
+    """Refuse a misspelt or missing name in the table of a problem."""
+    tables = [(f"{file}, {slug}", problem, {"mistakes"}, NAMES)]
+    for i, mistake in enumerate(problem.get("mistakes", []), start=1):
+        tables.append((f"{file}, {slug}, mistake {i}", mistake, {"hint", "code"}, set()))
+    for place, table, needed, more in tables:
+        if unknown := table.keys() - needed - more:
+            known = ", ".join(sorted(needed | more))
+            raise ValueError(f"{place}: {min(unknown)} is not one of {known}")
+        if missing := needed - table.keys():
+            raise ValueError(f"{place}: {min(missing)} is missing")
+
+
 def _evaluate(problem: dict[str, Any], answer: str, space: dict[str, Any]) -> dict[str, Any]:
-    kept = "law", "accuracy", "angles", "read"
-    known: dict[str, Any] = {key: problem[key] for key in kept if key in problem}
+    known: dict[str, Any] = {key: problem[key] for key in KEPT if key in problem}
     inputs = eval(problem.get("inputs", "[]"), space)
     defined = [node for node in ast.parse(answer).body if isinstance(node, ast.FunctionDef)]
     name = defined[-1].name

@@ -260,7 +260,13 @@ def test_missing_or_broken_tables_and_data_are_reported(tmp_path, monkeypatch):
         problem("ps2", "turn")
     with pytest.raises(ValueError, match=r"ps2\.toml is missing, and the tests of ps2\.ipynb need"):
         update(tmp_path / "ps2")
-    for text, said in (("[turn", r"^ps2\.toml: "), ("[turn]\ninputs = 1", r"^ps2\.toml, turn: ")):
+    for text, said in (
+        ("[turn", r"^ps2\.toml: "),
+        ("[turn]\ninputs = 1", r"^ps2\.toml, turn: mistakes is missing"),
+        ("[turn]\nmistakes = []\ninput = 1", r"^ps2\.toml, turn: input is not one of accuracy"),
+        ("[turn]\nmistakes = [{hint = '', cod = ''}]", r"turn, mistake 1: cod is not one of code"),
+        ("[turn]\nmistakes = []\ninputs = 1", r"^ps2\.toml, turn: TypeError"),
+    ):
         (tmp_path / "ps2.toml").write_text(text, "utf-8")
         with pytest.raises(ValueError, match=said):
             update(tmp_path / "ps2")

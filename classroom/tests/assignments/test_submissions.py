@@ -488,7 +488,7 @@ def test_a_notebook_with_too_few_cells_of_the_set_is_refused(release, change, fo
 
 
 CONFLICT = b'{\n<<<<<<< HEAD\n"a": 1\n=======\n>>>>>>> b\n}'
-BROKEN = [b"no json", b'{"cells": 3}', b'{"cells": [3]}', b"[1]", b"3", b"\xff\xfe", CONFLICT]
+BROKEN = [b"no json", b'{"cells": 3}', b'{"cells": [3]}', b"[1]", b"3", b"\xff\xfe"]
 BROKEN += [b'{"cells": []}', b'{"cells": ' + b"[" * 10**5, b'{"cells": [{"source": 3}]}']
 BROKEN += [b'{"cells": [{"source": [3]}]}', b'{"nbformat": 4', b"\x00" * 100, b"9" * 5000]
 
@@ -496,11 +496,14 @@ BROKEN += [b'{"cells": [{"source": [3]}]}', b'{"nbformat": 4', b"\x00" * 100, b"
 @pytest.mark.parametrize(
     ("content", "said"),
     [(b" ", "empty"), (b"%PDF-1.7", "a PDF or an archive"), (b"PK\x03", "a PDF or an archive")]
+    + [(b'{\n "cells": [\n', "damaged or not a notebook .it stops being JSON in line 3")]
     + [(content, "damaged or not a notebook") for content in BROKEN],
 )
 def test_files_without_a_notebook_are_refused(content, said):
     with pytest.raises(Refused, match=f"^my.ipynb is {said}"):
         read_notebook(content, "my.ipynb")
+    with pytest.raises(Refused, match=r"^my.ipynb has conflicts of a merge in git \(<<<<<<<\); take"):
+        read_notebook(CONFLICT, "my.ipynb")
 
 
 def test_ends_of_lines_of_all_systems_are_read():
