@@ -220,5 +220,5 @@ def test_errors_can_be_pickled():
     again = pickle.loads(pickle.dumps(error))
     assert str(again) == str(error) == "t = 0.5 of curve [1, 1]: no rotation"
     assert (again.time, again.curve, again.reason) == (0.5, 3, "no rotation")
-    lost = pickle.loads(pickle.dumps(rb.optimum.ConvergenceError(1e-3, 5)))
+    lost = pickle.loads(pickle.dumps(rb.optimum.ConvergenceError(1e-3, 5, "no reason")))
     assert (lost.residual, lost.iterations) == (1e-3, 5)

@@ -21,6 +21,7 @@ from rbcourse.optimum._collocation import TOGETHER, cayley, on_nodes, rates_of, 
 from rbcourse.so3 import exp_so3, hat, log
 
 FAST = 4 * np.pi  # if ‖w0‖ + ‖w1‖ is larger, all four of the `starts` are used
+DAMPINGS = 0.0, 1e-8, 1e-6, 1e-4, 1e-2, 1.0  # shares of the diagonal of JᵀJ; the best is used
 SHARES = np.array([1.0, 0.25])  # of a Gauss–Newton step; the best is used [1, 3: 51 of 1,200 rods]
 SAME = 1e-9  # numbers with a smaller relative difference count as equal
 TINY = 1e-150  # replaces norms that are 0 before a division; its square does not underflow
@@ -286,6 +287,7 @@ class Steps(NamedTuple):
 
     most: int
     worthwhile: float  # they end when one of them lowers the cost by less than this share
+    damped: bool = False  # many dampings of a step are tried, instead of its `SHARES`
 
 
 def lowered(functional: Functional, curves: Curves, steps: Steps) -> Curves:
@@ -293,7 +295,9 @@ def lowered(functional: Functional, curves: Curves, steps: Steps) -> Curves:
 
     For R exp(η̂), the deviation u changes, to first order, by D₀ η + D₁ η' + D₂ η'' (+ D₃ η'''). A
     step uses the η that minimises the integral of the squared new deviation, or this η times
-    another of the `SHARES` if the curve then costs less. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the
+    another of the `SHARES` if the curve then costs less. Damped steps (Levenberg–Marquardt) add
+    each of the `DAMPINGS` to the matrix of the least squares; they are slower, and succeed in
+    curved valleys, as those of thin rods. Here η = tᵐ (1 − t)ᵐ p(t), which keeps the
     ends, and p has half as many coefficients as there are nodes.
     """
     of_curves = functional.take(curves.problem)
@@ -303,21 +307,26 @@ def lowered(functional: Functional, curves: Curves, steps: Steps) -> Curves:
         before = cost[active]
         for part in blocks(len(active), TOGETHER):
             some = active[part]
-            R[some], cost[some] = _lower(of_curves.take(some), R[some], cost[some])
+            R[some], cost[some] = _lower(of_curves.take(some), R[some], cost[some], steps.damped)
         active = active[cost[active] < (1 - steps.worthwhile) * before]
         if not len(active):
             break
     return Curves(curves.problem, R, cost)
 
 
-def _lower(functional: Functional, R: Array, cost: Array) -> tuple[Array, Array]:
+def _lower(functional: Functional, R: Array, cost: Array, damped: bool) -> tuple[Array, Array]:
     each = np.arange(len(R))
     bumps = _bumps(R.shape[1], functional.ends // 2 + 1)
     J, u = gauss_newton(functional, R, bumps)
-    x = np.linalg.solve(J.mT @ J, -(J.mT @ u))
-    change = bumps[0] @ x.reshape(len(R), -1, 3)
-    tried = R @ cayley(SHARES[:, None, None, None] * change)
-    of_tried = functional.take(np.tile(each, len(SHARES)))
+    A, g = J.mT @ J, -(J.mT @ u)
+    if damped:
+        diagonal = np.eye(A.shape[-1]) * A
+        x = np.stack([np.linalg.solve(A + share * diagonal, g) for share in DAMPINGS])
+    else:
+        x = SHARES[:, None, None, None] * np.linalg.solve(A, g)
+    change = bumps[0] @ x.reshape(len(x), len(R), -1, 3)
+    tried = R @ cayley(change)
+    of_tried = functional.take(np.tile(each, len(x)))
     costs = cost_at_nodes(of_tried, tried.reshape(-1, *R.shape[1:]))
     tried = np.concatenate([R[None], tried])
     costs = np.vstack([cost, costs.reshape(-1, len(R))])

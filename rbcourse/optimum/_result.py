@@ -231,9 +231,7 @@ class OptimalChain(Chain):
 class ConvergenceError(RuntimeError):
     """The error raised if no curve is found; it gives the `residual` after `iterations` steps."""
 
-    def __init__(self, residual: float, iterations: int, reason: str = "") -> None:
-        if not reason:
-            reason = "the end velocities may be too large, or the principal moments too different"
+    def __init__(self, residual: float, iterations: int, reason: str) -> None:
         if residual < EXACT:
             reason = "only a saddle was found"
         what = f"no convergence: residual {residual:.1e} after {iterations} iterations"

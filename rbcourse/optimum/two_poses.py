@@ -13,6 +13,7 @@ from rbcourse._polynomials import grid
 from rbcourse.body import Body
 from rbcourse.curves.curve import Curve
 from rbcourse.curves.ends import Ends, Given, Rate, as_body, between, on_rotations
+from rbcourse.curves.functionals import Effort
 from rbcourse.optimum._collocation import Failure, relax
 from rbcourse.optimum._result import (
     ConvergenceError,
@@ -21,7 +22,7 @@ from rbcourse.optimum._result import (
     Optimum,
     optimum_of,
 )
-from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, jerk
+from rbcourse.optimum._search import LIMITS, Task, ball, cheapest, is_thin, jerk
 from rbcourse.optimum._search import body as of_body
 
 
@@ -62,7 +63,8 @@ def minimum_acceleration(
     -----
     RuntimeWarning
         If Newton's method does not converge for some problems of a stack (their curves are NaN), or
-        if a starting curve costs less than the returned one. Then ``converged`` is False.
+        if a starting curve costs less than the returned one. Then ``converged`` is False. Also if a
+        body is a thin rod, whose moments have a ratio above 20, and the curve is not certified.
 
     Notes
     -----
@@ -133,7 +135,7 @@ def minimum_torque(
     -----
     The method, errors, warnings and singular set are those of `minimum_acceleration`. The curve of
     a rod may not be the cheapest one, even if ``converged`` is True. For thin rods, the method
-    often does not converge, and may take minutes (docs/near_optimal.md has tests). A turn about a
+    may not converge, and may take a minute (docs/near_optimal.md has tests). A turn about a
     principal axis is a stationary curve; about the axis of the largest moment of inertia, it may be
     a saddle. With J = R G Rᵀ and H = R G w, the equation is J H'' + H' × H = c
     (`rbcourse.textbook.minimum_torque`).
@@ -242,18 +244,33 @@ def stationary(guess: Curve) -> Optimum:
 def _solved(task: Task, given: Given) -> Optimum:
     solutions = cheapest(task)
     if not given.duration.ndim and isinstance(solutions[0], Failure):
-        raise ConvergenceError(*solutions[0])
+        raise ConvergenceError(*solutions[0], _reason(task))
     equations, T = task.equations, given.duration
     rotation = optimum_of(equations.functional, equations.ends, solutions, T, given.body)
     lost = np.isnan(rotation.cost)
-    _warn(rotation, lost, "did not converge", "their curves are NaN")
+    _warn(rotation, lost, "did not converge", "their curves are NaN (see converged)")
     beaten = ~np.asarray(rotation.converged) & ~lost
-    why = "a curve that was tried costs less"
+    why = "a curve that was tried costs less (see converged)"
     _warn(rotation, beaten, "may not have reached the optimum", why)
+    thin = np.zeros_like(lost)
+    if isinstance(equations.functional, Effort):
+        thin = is_thin(equations.functional).reshape(T.shape) & ~lost & ~beaten
+    if thin.any():
+        unclear = thin & ~np.asarray(rotation.certified)
+        why = f"the curve of a rod with a ratio of moments above {LIMITS.thin:g} is not certified"
+        _warn(rotation, unclear, "may not have reached the optimum", why)
     if not given.path:
         return rotation
     path = np.stack(given.path, axis=-2)
     return OptimalMotion(duration=T, body=given.body, rotation=rotation, path=path)
+
+
+def _reason(task: Task) -> str:
+    """Return the possible causes of a failure."""
+    reasons = ["the end velocities may be too large"] * bool(task.equations.ends.any())
+    if isinstance(task.equations.functional, Effort):
+        reasons.append("the principal moments may be too different")
+    return ", or ".join(reasons)
 
 
 def _warn(curve: OptimalRotation, some: Array, what: str, why: str) -> None:
@@ -263,7 +280,7 @@ def _warn(curve: OptimalRotation, some: Array, what: str, why: str) -> None:
         some_of = f"{len(places)} of {curve.count} problems"
         which = f"{some_of} {what}, the first of them {first}" if first else f"the problem {what}"
         warnings.warn(
-            f"{which}: {why} (see converged)",
+            f"{which}: {why}",
             RuntimeWarning,
             stacklevel=4,
         )
