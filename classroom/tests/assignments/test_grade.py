@@ -88,7 +88,13 @@ SQUARE, HALF = "cell 3, answer of “A tiny set”", "cell 5, answer of “A tin
 # Each row has a student, a change, answers, points (none if refused), and parts of the remarks.
 CLASS = [
     ("good one", None, {"square": WARNS}, "2 1", []),
-    ("tampers", tamper, {"half": "half = 3"}, "2 0", ["is a copy; another one counts", "more"]),
+    (
+        "tampers",
+        tamper,
+        {"half": "half = squar(3)"},
+        "2 0",
+        ["is a copy; another one counts", "more", "“A tiny set”: ends with NameError"],
+    ),
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),
     ("nosy", None, {"square": NOSY}, "0 1", []),
