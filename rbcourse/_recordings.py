@@ -156,8 +156,7 @@ def read_recording(
     if rate is not None and unit is not None:
         raise ValueError("unit: not with rate, which is in Hz")
     euroc = form == "euroc" or any(name.lower().startswith("p_rs_r") for name in rows.names)
-    dated = "time" in columns and bool(_DATE.fullmatch(rows.cells(0)[columns["time"]]))
-    if dated:
+    if "time" in columns and _has_dates(rows, columns["time"]):
         if unit is not None:
             raise ValueError(f"unit: not with dates, which {rows.place(0)} has")
         rows, stated = _with_seconds(rows, columns["time"]), "s"
@@ -281,6 +280,13 @@ def _seconds(cell: str) -> str:
         whole = Decimal(int(datetime.fromisoformat(second + (zone or "Z")).timestamp()))
         return f"{EXACT.add(whole, Decimal(fraction or 0)):f}"
     return cell
+
+
+def _has_dates(rows: _Rows, column: int) -> bool:
+    """Tell whether the first cell of a column that is not missing is a date."""
+    cells = (cell for i in range(len(rows.texts)) for cell in rows.cells(i)[column : column + 1])
+    first = next((cell for cell in cells if cell.lower() not in _MISSING), "")
+    return bool(_DATE.fullmatch(first))
 
 
 def _with_seconds(rows: _Rows, column: int) -> _Rows:
@@ -453,7 +459,7 @@ def _named(rows: _Rows, form: str | None, unit: str | None) -> tuple[Columns, st
         if meaning:
             found.setdefault(meaning, []).append(i)
             units[meaning] = named
-    if "time" not in found and not rows.names[0] and _DATE.fullmatch(rows.cells(0)[0]):
+    if "time" not in found and not rows.names[0] and _has_dates(rows, 0):
         found["time"] = [0]  # the index of pandas
     if "nanoseconds" in found and "time" not in found:
         found["time"], units["time"] = found.pop("nanoseconds"), "ns"

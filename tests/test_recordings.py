@@ -367,6 +367,7 @@ def test_relative_times_are_rounded_once(tmp_path):
 @pytest.mark.parametrize("names", [OWN, OWN.replace("time [s]", "datetime"), OWN[8:]])
 def test_dates_are_exact_seconds_since_1970(tmp_path, names):
     dates = {
+        "": None,
         "2026-03-29 01:59:59.123456789": "1774749599.123456789",
         "2026-03-29T03:00:00.5+01:00": "1774749600.5",
         "2026-03-29T02:00:01Z": "1774749601",
