@@ -20,11 +20,18 @@ import nbformat
 from nbformat import NotebookNode
 
 from rbclassroom.assignments.downloads import File, find_files, find_owners, written
-from rbclassroom.assignments.submissions import count_found, count_written, read_notebook
+from rbclassroom.assignments.submissions import (
+    Refused,
+    count_found,
+    count_written,
+    read_notebook,
+    restore,
+)
 from rbcourse.files import replace_file
 
 LISTS = ["collected", "unchanged", "renamed", "late", "duplicates", "ignored", "another set"]
-LISTS += ["fewer answers", "unmatched", "refused", "nothing usable", "not on the roster", "missing"]
+LISTS += ["fewer answers", "not gradable", "unmatched", "refused", "nothing usable"]
+LISTS += ["not on the roster", "missing"]
 OWN = "source", "private", "release", "handouts", "submitted", "autograded", "feedback"
 NOT_OF_A_SET = "it is not a notebook of a handout; ask for the answers in a copy of the handout"
 Row = tuple[str, str, str]  # a list, a file or student in this list, and the reason
@@ -68,6 +75,8 @@ def collect(folder: Path, assignments: Path, due: datetime | None = None) -> lis
             rows.append(("fewer answers", f"{who}, {name}", why))
         if best.why:
             rows.append(("another set", f"{who}, {name}", best.why))
+        if why := _why_refused(best, sets[name]):
+            rows.append(("not gradable", f"{who}, {name}", why))
         if late := _why_late(best.about | {"date": min(dates)}, due):
             rows.append(("late", f"{who}, {name}", late))
         if roster and who not in ids:
@@ -120,7 +129,7 @@ def _still_holds(row: dict[str, str], names: list[str], seen: Collection[str]) -
     sets, student = row["sets"].split(), row["what"].partition(", ")[0]
     if sets and not {*sets} & {*names}:
         return True
-    of_students = "late", "nothing usable", "fewer answers", "another set"
+    of_students = "late", "nothing usable", "fewer answers", "not gradable", "another set"
     lasting = row["list"] in of_students or not sets
     return lasting and not {student, row["what"]} & {*seen}
 
@@ -196,6 +205,19 @@ def _why_not(other: File, best: File) -> str:
     same = ", of the same date," * (_rank(other)[:3] == _rank(best)[:3])
     more = " with more answers" * (bool(same) and _rank(other)[3] < _rank(best)[3])
     return f"{best.label}{same}{more} is used instead"
+
+
+def _why_refused(file: File, sets: list[NotebookNode]) -> str:
+    """Return why `grade` will refuse a notebook, or "" if it fits one of the sets of this name."""
+    why = ""
+    for one in sets:
+        try:
+            restore(read_notebook(file.content, file.label), one)
+        except Refused as error:
+            why = str(error)
+        else:
+            return ""
+    return why
 
 
 def _namesakes(groups: Iterable[Group], submitted: Path) -> Iterator[Row]:
@@ -322,6 +344,12 @@ def _named(name: str, sets: Iterable[str]) -> list[str]:
     return [s for s in sets if re.search(rf"(?<![^\W_]){re.escape(s)}(?!\d)", name, re.IGNORECASE)]
 
 
+def _bare(name: str) -> str:
+    """Return a plain name without accents, which some systems remove."""
+    letters = unicodedata.normalize("NFKD", name)
+    return _plain("".join(c for c in letters if not unicodedata.combining(c)))
+
+
 def _plain(name: str) -> str:
     """Return a name in lower case without apostrophes, which Moodle removes."""
     name = re.sub("['`’]", "", unicodedata.normalize("NFKC", name).casefold())
@@ -330,15 +358,18 @@ def _plain(name: str) -> str:
 
 def _student(about: dict[str, str], roster: list[dict[str, str]]) -> str:
     """Return a student's id in the roster, or an id made from the name."""
-    canvas, plain, number = bool(about["number"]), _plain(about["name"]), _plain(about["id"])
+    canvas, number = bool(about["number"]), _plain(about["id"])
     found = [r["id"] for r in roster if canvas and r.get("lms_user_id") == about["id"]]
     found = found or [r["id"] for r in roster if r["id"] == about["name"]]
     key: Any = "".join if canvas else sorted  # Canvas writes names without spaces, last name first
-    for row in roster if plain and not found else ():
-        words = _plain(f"{row.get('last_name', '')} {row.get('first_name', '')}")
-        found += [row["id"]] * (key(words.split("_")) == key(plain.split("_")))
+    for spell in _plain, _bare:
+        wanted = spell(about["name"])
+        for row in roster if wanted and not found else ():
+            words = spell(f"{row.get('last_name', '')} {row.get('first_name', '')}")
+            found += [row["id"]] * (key(words.split("_")) == key(wanted.split("_")))
     if len(found) == 1:
         return found[0]
+    plain = _plain(about["name"])
     # names of unknown Canvas students, and anonymous or reserved names, get a number
     alone = plain not in ("", "participant", "aux", "con", "nul", "prn") and not canvas
     return plain if alone else f"{plain}_{number}".strip("_") or "student"

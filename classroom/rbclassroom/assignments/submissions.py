@@ -87,12 +87,14 @@ def restore(notebook: NotebookNode, original: NotebookNode) -> list[str]:
     """Restore the cells of a set in a student's notebook, and return remarks on the changes.
 
     Answers keep their texts, and all cells keep the student's order. Raise `Refused` if less than
-    half of the set is there, and most marks are lost or belong to another set.
+    half of the set is there, and most marks are lost or belong to another set; an answer is there
+    if a cell defines its function.
     """
     work = _Restoring(notebook.cells, original)
     foreign = work.find()
-    found, size = len({*work.names()} & work.wanted.keys()), len(work.wanted)
-    if found - work.unmarked <= foreign and 2 * found < size:
+    named, found, size = work.names(), len(work.present()), len(work.wanted)
+    marked = len({*named} & work.wanted.keys()) - work.unmarked
+    if marked <= foreign and 2 * found < size:
         cure = "copy your answers into a new copy of the notebook that was handed out"
         raise Refused(f"only {found} of the {size} cells are those of this problem set; {cure}")
     work.join_rest()
@@ -117,8 +119,8 @@ def count_written(notebook: NotebookNode) -> int:
 
 
 def _core(text: str) -> str:
-    """Return a text without white space; editors change white space."""
-    return "".join(text.split())
+    """Return a text without white space and without a line "# %%"; editors change them."""
+    return "".join(re.sub(r"\A\s*# ?%%.*", "", text).split())
 
 
 def _around(text: str, locked: str) -> list[str]:
@@ -178,6 +180,13 @@ class _Restoring:
 
     def names(self) -> list[str]:
         return [grade_id(cell) for cell in self.cells]
+
+    def present(self) -> set[str]:
+        """Return the names of the cells that are there, and of answers whose function is there."""
+        rest = [cell for cell in self.cells if not grade_id(cell)]
+        answers = {name: cell for name, cell in self.wanted.items() if is_answer(cell)}
+        written = {name for name, a in answers.items() if any(_defines(cell, a) for cell in rest)}
+        return ({*self.names()} & self.wanted.keys()) | written
 
     def place(self, cell: NotebookNode) -> int:
         return next(at for at, each in enumerate(self.cells) if each is cell)

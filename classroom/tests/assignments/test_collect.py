@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import os
 import shutil
 import subprocess
@@ -204,11 +205,12 @@ def test_a_student_keeps_one_id_in_all_sets(course):
 def test_students_missing_from_the_roster_or_the_downloads_are_listed(course):
     roster = "id,first_name,last_name,email,lms_user_id\n"
     roster += "s1,Jörg,Müller,,\ns2,Eva,Maria Roth,,\ns3,Al,Li,,500\ns4,Bo,Ek,,\ns5,Al,O'Neil,,\n"
+    roster += "s6,Séan,Ó Briain,,\n"
     (course / "students.csv").write_text(roster, "utf-8-sig")
     names = [moodle("Müller Jörg_500"), "mariarotheva_7_1_ps1.ipynb", "renamed_500_2_ps1.ipynb"]
-    names += [moodle("Al ONeil_9"), moodle("New One_8")]
+    names += [moodle("Al ONeil_9"), moodle("New One_8"), moodle("Sean O Briain_3")]
     rows = collected(course, dict.fromkeys(names, answered(course)))
-    wanted = {f"{who}/ps1" for who in ("new_one", "s1", "s2", "s3", "s5")}
+    wanted = {f"{who}/ps1" for who in ("new_one", "s1", "s2", "s3", "s5", "s6")}
     assert files(course).keys() == wanted
     assert of("missing", rows) == [("s4, ps1", "Bo Ek")]
     assert of("not on the roster", rows) == [("new_one", "New One (8)")]
@@ -711,6 +713,19 @@ def test_a_newer_file_with_fewer_answers_is_named(course):
     ((who, why),) = of("fewer answers", collect(folder, course))
     assert who == "a, ps1"
     assert "a.zip: A_1_assignsubmission_file/ps1.ipynb has more answers" in why
+
+
+def test_a_notebook_that_cannot_be_graded_is_named(course):
+    folder, work = course.parents[1] / "downloads", json.loads(answered(course))
+    work["cells"] = [{**work["cells"][0], "metadata": {}}]
+    (folder / "a.zip").write_bytes(packed({moodle("A_1"): json.dumps(work).encode()}))
+    rows = collect(folder, course)
+    ((who, why),) = of("not gradable", rows)
+    assert who == "a, ps1"
+    assert "only 1 of the" in why
+    assert len(of("collected", rows)) == 1
+    (folder / "a.zip").write_bytes(packed({moodle("A_1"): answered(course)}, (2030, 1, 1, 0, 0, 0)))
+    assert of("not gradable", collect(folder, course)) == []
 
 
 def test_a_damaged_file_is_no_longer_refused_if_there_is_a_good_one(course):

@@ -460,6 +460,23 @@ def test_no_text_of_a_student_is_lost(release, seed):
     nbformat.validate(notebook)
 
 
+def test_answers_without_marks_count_as_cells_of_the_set(release):
+    """Another program has kept the text of the code alone; the tests begin with "# %%"."""
+
+    def code_alone(notebook):
+        cells = [code(text(each)) for each in notebook["cells"] if each["cell_type"] == "code"]
+        for each in cells:
+            each["source"] = f"# %%\n{each['source']}"
+        notebook["cells"] = cells
+
+    content = json.dumps(submitted(release, code_alone)).encode()
+    original = nbformat.reads(release, as_version=4)
+    assert 2 * count_found(read_notebook(content, "it"), original) < 8
+    notebook, _ = restored(release, content)
+    for name in ("square-answer", "half-answer"):
+        assert GOOD[name].strip() in cell(notebook, name).source
+
+
 def of_another_set(each, at):
     each["metadata"]["nbgrader"]["grade_id"] += "-of-another"
 
@@ -472,17 +489,17 @@ def new_notebook_of(*sources):
 
 
 @pytest.mark.parametrize(
-    ("change", "found"),
+    ("change", "named", "found"),
     [
-        (of_every_cell(of_another_set), 0),
-        (new_notebook_of(*GOOD.values()), 0),
-        (new_notebook_of("import math", "half = 0.5"), 1),
-        (in_order(removed(0, 1, 2, 3, 5), of_every_cell(without_marks)), 3),
+        (of_every_cell(of_another_set), 0, 1),  # one cell defines a function of the set
+        (new_notebook_of(*GOOD.values()), 0, 1),
+        (new_notebook_of("import math", "half = 0.5"), 1, 1),
+        (in_order(removed(0, 1, 2, 3, 5), of_every_cell(without_marks)), 3, 3),
     ],
 )
-def test_a_notebook_with_too_few_cells_of_the_set_is_refused(release, change, found):
+def test_a_notebook_with_too_few_cells_of_the_set_is_refused(release, change, named, found):
     content, original = json.dumps(submitted(release, change)).encode(), nbformat.reads(release, 4)
-    assert count_found(read_notebook(content, "it"), original) == found
+    assert count_found(read_notebook(content, "it"), original) == named
     with pytest.raises(Refused, match=rf"only {found} of the 8 cells .* copy your answers into a"):
         restored(release, content)
 
