@@ -245,8 +245,40 @@ def test_wrong_poses_are_announced(smooth, part, count):
     wrong = good.copy()
     wrong[60 : 60 + count] @= rb.exp_se3(shift)
     message = rf"^poses\[(59|6[0-3])\] or a pose near it may be wrong: its {part} is .* times"
-    with pytest.warns(RuntimeWarning, match=message):
+    with pytest.warns(RuntimeWarning, match=message) as told:
         smooth(t, wrong)
+    assert told[0].filename == __file__
+    with pytest.warns(RuntimeWarning, match=message):
+        smooth(t, wrong, period=0.4)
+    smooth(t, wrong, period=0.4, weights=np.ones(200))  # as the loop does
+
+
+def test_a_lasting_turn_by_relabelled_markers_is_announced():
+    rng, t = np.random.default_rng(3), np.linspace(0, 10, 1000)
+    poses = rb.exp_se3(t[:, None] * [0, 0.3, 1, 0.2, 0, 0] + 0.001 * rng.normal(size=(1000, 6)))
+    poses[600:, :3, :3] @= rb.exp_so3([np.pi, 0, 0])
+    message = r"^poses\[(599|600)\] or a pose near it may be wrong: its turn .* its neighbours as"
+    for period in (None, 0.5):
+        with pytest.warns(RuntimeWarning, match=message):
+            rb.smoothing_spline(t, poses, period=period)
+
+
+@pytest.mark.parametrize("step", [0.005, 0.1])
+@pytest.mark.parametrize("noise", [0, 1e-5, 1e-3])
+def test_motions_whose_velocity_jumps_have_no_wrong_poses(step, noise):
+    rng, t = np.random.default_rng(5), np.arange(0, 10, step)
+    way = np.interp(t, [0, 2, 4, 5, 5.5, 8], [0, 0, 2, 2, 1, 3])[:, None] * [0.2, 0.5, 0, 1, 0, 0.3]
+    poses = rb.pose_from_coordinates(way + noise * rng.normal(size=(len(t), 6)))
+    with warnings.catch_warnings(action="error"):
+        rb.smoothing_spline(t, poses, period=max(1, 10 * step))
+
+
+def test_an_end_that_does_not_rest_is_told():
+    rng, t = np.random.default_rng(6), np.linspace(0, 4, 400)
+    poses = rb.exp_so3(t[:, None] * [0, 0, 5] + 0.001 * rng.normal(size=(400, 3)))
+    said = r"^poses\[(\d|39\d)\] .* from the curve as usual, or the body does not rest there"
+    with pytest.warns(RuntimeWarning, match=said):
+        rb.smoothing_spline(t, poses, "rest")
 
 
 @pytest.mark.parametrize("rests", [0, 900])

@@ -33,22 +33,19 @@ from rbcourse._checks import as_single, check_all
 from rbcourse._numerics import Array, matvec
 from rbcourse._quaternions import quaternion_of
 from rbcourse._valid import as_rotations_or_poses
+from rbcourse.curves._doubts import warn_of_doubts
 from rbcourse.curves.chain import Chain
 from rbcourse.curves.closed import QuaternionCubic
 from rbcourse.curves.rigid import RigidMotion
 from rbcourse.curves.velocities import usual_step
 from rbcourse.projection import nearest
 from rbcourse.quaternion import continuous_quaternions, quaternion_conjugate, quaternion_multiply
-from rbcourse.so3 import log, vee
+from rbcourse.so3 import vee
 
 LEAST, STEP, MOST = -12.0, 1.5, 28.0  # of log λ, if the mean step and the mean weight are 1
 TOGETHER = 1e-3  # of the usual step [one pair apart by 2e-5 changed the best period by 8 %]
 LEAST_PERIOD = 1e-3  # in mean steps; below, the degrees of freedom and the noise are lost
 _RATIO = 1e6  # of weights; with 1e12, a period of 1,000 steps gives a noise that is wrong by 30 %
-_GAP = 5.0  # usual steps; shorter steps are no gaps [the longest of 1,000 random ones: 3.4 to 8]
-_FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
-_WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
-_ROUNDING = 1e-9  # times the largest entry of the poses; smaller errors are those of rounding
 _DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
 
 
@@ -116,11 +113,12 @@ def smoothing_spline(
     Warns
     -----
     RuntimeWarning
-        If the body turns by more than 1 rad in the time period/2π, if an interval between two times
+        If the body turns by more than 1 rad in the time period/2π; if an interval between two times
         is longer than the period and than five usual steps (the motion in this gap is not known;
-        smooth both sides apart, and join them by `chain`), or if, without a given period, nothing
-        is smoothed, or a pose is ten times as far from the curve as half of the poses are, or if
-        cross validation has fewer than ten poses.
+        smooth both sides apart, and join them by `chain`); if, without given weights, a pose is ten
+        times as far from the line through its neighbours as is usual near it; or if, without a
+        given period, nothing is smoothed, a pose is ten times as far from the curve as half of the
+        poses are, or cross validation has fewer than ten poses.
 
     Notes
     -----
@@ -171,10 +169,7 @@ def smoothing_spline(
         )
     if A.shape[-1] == 4:
         c = with_origins(c, RigidMotion, smoother, A[:, :3, 3], noises[1], periods[1])
-    smoother.check_gaps(c.period)
-    if period is None:
-        smoother.check_noise(c.period, noise)
-        smoother.check_poses(c, A)
+    warn_of_doubts(smoother, c, A, noise, period, weights)
     return c
 
 
@@ -426,61 +421,6 @@ class Smoother:
         """Return the period of which an oscillation keeps half of its amplitude."""
         return float(2 * np.pi * self.unit * smoothing**0.25)
 
-    def check_gaps(self, periods: Any) -> None:
-        """Warn if the longest step is a gap, in which the motion is not known.
-
-        In gaps of 1, 1.5 and 2 periods, the largest error is 3, 5 and 30 times the usual error.
-        """
-        steps, period = np.diff(self.knots), np.min(periods)
-        i = np.argmax(steps)
-        if steps[i] > max(period, _GAP * usual_step(steps)):
-            warnings.warn(
-                f"times: no pose between {self.knots[i]:.13g} and {self.knots[i + 1]:.13g}, longer "
-                f"than the period {period:.3g}, so the motion there is not known; smooth both "
-                "sides apart",
-                RuntimeWarning,
-                stacklevel=3,
-            )
-
     def is_least(self, periods: Any) -> NDArray[np.bool_]:
         """Tell which of the periods are the least one that is tried."""
         return np.atleast_1d(periods) < self.period(np.exp(LEAST + STEP))
-
-    def check_noise(self, periods: Any, noise: ArrayLike | None) -> None:
-        """Warn if there are few poses, or if the best of the tried periods is the least one."""
-        if noise is None and len(self.knots) < _FEW:
-            warnings.warn(
-                f"cross validation of {len(self.knots)} poses may take the motion for noise, and "
-                f"{_FEW} or more are wanted; give noise or period",
-                RuntimeWarning,
-                stacklevel=3,
-            )
-            return
-        least = self.is_least(periods)
-        if least.any():
-            part = ("rotations: ", "origins: ")[np.argmax(least)] if least.size == 2 else ""
-            why = "cross validation finds nothing to smooth, so the noise is not known; give noise"
-            if noise is not None:
-                why = "nothing is smoothed; some poses are wrong, or noise is too small; change it"
-            warnings.warn(f"{part}{why} or period", RuntimeWarning, stacklevel=3)
-
-    def check_poses(self, curve: Any, poses: Array) -> None:
-        """Warn if a pose is much farther from the curve than half of the poses are.
-
-        Poses on the curve are not counted: those of a rest may have no noise.
-        """
-        near = curve(self.knots)[self.which]
-        turn = log(near[:, :3, :3].mT @ poses[:, :3, :3])
-        errors = {"turn": turn, "origin": near[:, :3, 3:] - poses[:, :3, 3:]}
-        for (part, error), least in zip(errors.items(), self.is_least(curve.period), strict=False):
-            size = np.sqrt(self.weights) * np.linalg.norm(error.reshape(-1, 3), axis=1)
-            i, off = np.argmax(size), size > _ROUNDING * (1 + np.abs(poses).max())
-            usual = np.median(size[off]) if off.any() else np.inf
-            if size[i] > _WRONG * usual and not least:
-                warnings.warn(
-                    f"poses[{i}] or a pose near it may be wrong: its {part} is "
-                    f"{size[i] / usual:.0f} times as far from the curve as usual; the loop in "
-                    "help(rbcourse.smoothing_spline) finds wrong poses",
-                    RuntimeWarning,
-                    stacklevel=3,
-                )

@@ -29,6 +29,7 @@ from rbcourse._docs import described_by
 from rbcourse._numerics import Array, solve
 from rbcourse._polynomials import grid
 from rbcourse.body import Body
+from rbcourse.curves._doubts import warn_of_doubts
 from rbcourse.curves.functionals import BallAcceleration
 from rbcourse.curves.smoothing import (
     LEAST,
@@ -124,10 +125,7 @@ def minimum_acceleration_smoothing(
     if A.shape[-1] == 4:
         c = with_origins(c, OptimalMotion, smoother, A[:, :3, 3], noises[1], periods[1])
         c = replace(c, cost=c.cost + c.body.mass * float(np.sum(c.legs.moving_cost)))
-    smoother.check_gaps(c.period)
-    if period is None:
-        smoother.check_noise(c.period, noise)
-        smoother.check_poses(c, A)
+    warn_of_doubts(smoother, c, A, noise, period, weights)
     return c
 
 

@@ -1,0 +1,144 @@
+"""Warnings about recordings that are smoothed: gaps, wrong poses, and a doubtful noise."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike
+
+from rbcourse._numerics import Array
+from rbcourse.curves.velocities import usual_step
+from rbcourse.so3 import angle_between, exp_so3, log
+
+if TYPE_CHECKING:
+    from rbcourse.curves.smoothing import Smoother
+
+GAP = 5.0  # usual steps; shorter steps are no gaps [the longest of 1,000 random ones: 3.4 to 8]
+FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
+WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
+OFF_LINE = 5.0  # times the usual distance [noise alone: 3; three poses off by 50 times: 7]
+NEAR = 10  # poses on each side; three quarters of them are within the usual distance
+ROUNDING = 1e-9  # times the largest entry of the poses; smaller errors are those of rounding
+
+
+def warn_of_doubts(
+    smoother: Smoother,
+    curve: Any,
+    poses: Array,
+    noise: ArrayLike | None,
+    period: ArrayLike | None,
+    weights: ArrayLike | None,
+) -> None:
+    """Warn of doubts about a smoothed curve; the arguments are those of `smoothing_spline`.
+
+    Given weights may be those of a search for wrong poses, so there is no warning of them.
+    """
+    _check_gaps(smoother, curve.period)
+    if weights is None and _check_neighbours(smoother, poses):
+        return
+    if period is None:
+        _check_noise(smoother, curve.period, noise)
+        _check_poses(smoother, curve, poses)
+
+
+def _warn(what: str, depth: int = 0) -> None:
+    """Warn; the place is the call of `smoothing_spline`, `depth` calls above a check."""
+    warnings.warn(what, RuntimeWarning, stacklevel=5 + depth)
+
+
+def _warn_of_pose(i: int | np.intp, why: str) -> None:
+    cure = "the loop in help(rbcourse.smoothing_spline) finds wrong poses"
+    _warn(f"poses[{i}] or a pose near it may be wrong: its {why}; {cure}", 1)
+
+
+def _check_gaps(smoother: Smoother, periods: Any) -> None:
+    """Warn if the longest step is a gap, in which the motion is not known.
+
+    In gaps of 1, 1.5 and 2 periods, the largest error is 3, 5 and 30 times the usual error.
+    """
+    knots, period = smoother.knots, np.min(periods)
+    steps = np.diff(knots)
+    i = np.argmax(steps)
+    if steps[i] > max(period, GAP * usual_step(steps)):
+        _warn(
+            f"times: no pose between {knots[i]:.13g} and {knots[i + 1]:.13g}, longer than the "
+            f"period {period:.3g}, so the motion there is not known; smooth both sides apart"
+        )
+
+
+def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
+    """Warn if a pose is far from the line through the poses before and after it.
+
+    It is far if its distance is five times the usual one near it, and larger than the usual step
+    there: where the velocity of a motion jumps, the distance is at most a step. There may be too
+    few poses, or several at a time; then nothing is checked.
+    """
+    t = smoother.knots
+    if len(poses) != len(t) or len(t) < 2 * NEAR:
+        return False
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    bend = (t[1:-1] - t[:-2]) * (t[2:] - t[1:-1])  # an acceleration's distance is bend/2 times it
+    longer = np.maximum(bend / _usual_near(bend), 1)
+    before, R, after = poses[:-2, :3, :3], poses[1:-1, :3, :3], poses[2:, :3, :3]
+    between = before @ exp_so3(share * log(before.mT @ after))
+    distances = {"turn": (angle_between(between, R), angle_between(before, R))}
+    if poses.shape[-1] == 4:
+        first, x, last = (poses[part, :3, 3] for part in (np.s_[:-2], np.s_[1:-1], np.s_[2:]))
+        off = first + share * (last - first) - x
+        distances["origin"] = np.linalg.norm(off, axis=1), np.linalg.norm(x - first, axis=1)
+    found = False
+    for part, (off, step) in distances.items():
+        usual = np.maximum(_usual_near(off), ROUNDING * (1 + np.abs(poses).max()))
+        ratio = np.where(off > _usual_near(step), off / (longer * usual), 0)
+        i = np.argmax(ratio)
+        if ratio[i] > OFF_LINE:
+            far = f"{part} is {ratio[i]:.0f} times as far from the line through its neighbours as"
+            _warn_of_pose(i + 1, f"{far} usual")
+            found = True
+    return found
+
+
+def _usual_near(x: Array) -> Array:
+    """Return an upper bound of three quarters of the values before or after each one."""
+    around = sliding_window_view(np.pad(x, NEAR, mode="reflect"), NEAR)
+    usual = np.sort(around, axis=1)[:, 3 * NEAR // 4]
+    return np.maximum(usual[: len(x)], usual[NEAR + 1 :])
+
+
+def _check_noise(smoother: Smoother, periods: Any, noise: ArrayLike | None) -> None:
+    """Warn if there are few poses, or if the best of the tried periods is the least one."""
+    if noise is None and len(smoother.knots) < FEW:
+        _warn(
+            f"cross validation of {len(smoother.knots)} poses may take the motion for noise, and "
+            f"{FEW} or more are wanted; give noise or period"
+        )
+        return
+    least = smoother.is_least(periods)
+    if least.any():
+        part = ("rotations: ", "origins: ")[np.argmax(least)] if least.size == 2 else ""
+        why = "cross validation finds nothing to smooth, so the noise is not known; give noise"
+        if noise is not None:
+            why = "nothing is smoothed; some poses are wrong, or noise is too small; change it"
+        _warn(f"{part}{why} or period")
+
+
+def _check_poses(smoother: Smoother, curve: Any, poses: Array) -> None:
+    """Warn if a pose is much farther from the curve than half of the poses are.
+
+    Poses on the curve are not counted: those of a rest may have no noise.
+    """
+    near = curve(smoother.knots)[smoother.which]
+    turn = log(near[:, :3, :3].mT @ poses[:, :3, :3])
+    errors = {"turn": turn, "origin": near[:, :3, 3:] - poses[:, :3, 3:]}
+    for (part, error), least in zip(errors.items(), smoother.is_least(curve.period), strict=False):
+        size = np.sqrt(smoother.weights) * np.linalg.norm(error.reshape(-1, 3), axis=1)
+        i, off = np.argmax(size), size > ROUNDING * (1 + np.abs(poses).max())
+        usual = np.median(size[off]) if off.any() else np.inf
+        if size[i] > WRONG * usual and not least:
+            why = f"{part} is {size[i] / usual:.0f} times as far from the curve as usual"
+            if smoother.pad and min(i, len(poses) - 1 - i) < NEAR:
+                why += ", or the body does not rest there"
+            _warn_of_pose(i, why)
