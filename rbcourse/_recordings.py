@@ -65,7 +65,7 @@ A group "axis" is a part of the meaning. Between p or q and the axis, EuRoC has 
 """
 _OTHER = re.compile(
     r"(.*_)?(std|stddev|err|error|cov|covariance|var|variance|sigma|vel|velocity|rate|linear|angular"
-    r"|acc|accel|acceleration|twist|gyr|gyro|mag)(_.*)?|(alpha|a)[xyz]_body_.*"
+    r"|acc|accel|acceleration|twist|gyr|gyro|mag|goal|target|desired|reference|cmd|command)(_.*)?|(alpha|a)[xyz]_body_.*"
 )
 """Names of columns that hold no pose, although they may contain the name of an axis."""
 _AXIS = re.compile(
@@ -469,7 +469,10 @@ def _named(rows: _Rows, form: str | None, unit: str | None) -> tuple[Columns, st
     for meaning, places in found.items():
         if len(places) > 1:
             names = " and ".join(repr(rows.names[i]) for i in places[:2])
-            raise ValueError(f"{rows.file}: {names} both name a column of {meaning}; rename one")
+            raise ValueError(
+                f"{rows.file}: {names} both name a column of {meaning}; format= may be a list of "
+                "names for all columns, with '-' for one of these"
+            )
     read = {i for places in found.values() for i in places}
     others = [name for i, name in enumerate(rows.names) if i not in read]
     others = [n for n in others if _words(n) and not _OTHER.fullmatch("_".join(_words(n)))]
