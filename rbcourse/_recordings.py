@@ -65,7 +65,7 @@ A group "axis" is a part of the meaning. Between p or q and the axis, EuRoC has 
 """
 _OTHER = re.compile(
     r"(.*_)?(std|stddev|err|error|cov|covariance|var|variance|sigma|vel|velocity|rate|linear|angular"
-    r"|acc|accel|acceleration|twist|gyr|gyro|mag|goal|target|desired|reference|cmd|command)(_.*)?|(alpha|a)[xyz]_body_.*"
+    r"|acc|accel|acceleration|twist|gyr|gyro|mag)(_.*)?|(alpha|a)[xyz]_body_.*"
 )
 """Names of columns that hold no pose, although they may contain the name of an axis."""
 _AXIS = re.compile(
@@ -95,6 +95,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|[+-]\d\d:?\d\d)?", re.ASCII)
 """A date with a time, as in ISO 8601: the second, its fraction, and the time zone."""
 _FEW = 0.05  # of the rows may be left out
+_SET_BACK = "the clock was set back, or the rows are in another order; split the file"
 _MISSING = {"", "nan", "-nan", "nat", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"}
 _MISSING |= {"-nan(ind)", "1.#qnan"}
 _LOG = logging.getLogger("rbcourse.files")
@@ -190,6 +191,13 @@ def read_recording(
     if unit != "s" and rate is None:
         _check_unit(rows.place(kept[0]), stamps, known)
     ordered, more = _increasing(rows, kept, stamps, skip)
+    moved = sum(not np.array_equal(table[i], table[i - 1]) for i in more["repeated"])
+    if moved > len(kept) / 2:
+        raise ValueError(
+            f"{file}: poses with equal times differ, and more than half of the rows would be left "
+            "out, so the clock has too few digits; format= may be a list of names with '-' for the "
+            "column of the times, and then rate= or times= gives them"
+        )
     for kind, which in {"nan": dropped, **more}.items():
         if which:
             some = ", ".join(str(rows.lines[i]) for i in which[:8]) + ", …" * (len(which) > 8)
@@ -214,7 +222,7 @@ def _increasing(
             cure = f"skip={kind!r} leaves such rows out"
             lost = sum(later <= last for later in stamps[number:])
             if kind == "unordered" and lost > max(10, _FEW * len(stamps)):
-                cure = "the clock was set back, or the rows are in another order; split the file"
+                cure = _SET_BACK
             if constant:
                 cure = "all times are equal, so they are not the times of the poses"
             raise ValueError(
@@ -222,6 +230,8 @@ def _increasing(
                 f"row before; {cure}"
             )
         dropped[kind].append(i)
+    if len(dropped["unordered"]) > max(10, _FEW * len(stamps)):
+        raise ValueError(f"{rows.place(dropped['unordered'][0])}: {_SET_BACK}")
     return ordered, dropped
 
 

@@ -210,7 +210,7 @@ REFUSED = {
     "colmap_images.txt": ("1 0.8 0 0 0.6 1.5 0.25 0.75 1 a.jpg\n2 3 -1\n", "10 columns"),
     "two_bodies.csv": (
         f"time,a_pos_x,b_pos_x,y,z,qw,qx,qy,qz\n0,1,{ROWS}\n",
-        "'a_pos_x' and 'b_pos_x' both name a column of x; rename one",
+        "'a_pos_x' and 'b_pos_x' both name a column of x; format= may be a list",
     ),
     "no_times.csv": (f"x,y,z,qw,qx,qy,qz\n{ROWS}\n", "the name time. .* Otherwise times= takes"),
     "inches.csv": (f"time,x [in],y [in],z [in],qw,qx,qy,qz\n0,{ROWS}\n", "positions in m, cm or"),
@@ -415,6 +415,18 @@ def test_skipped_rows_are_left_out_and_told(tmp_path, caplog):
             rb.read_path(file, skip=skip)
     with pytest.raises(ValueError, match="no row has all its numbers"):
         rb.read_path(written(tmp_path, "b.txt", f"0 {lost}\n"), skip="nan")
+
+
+def test_rows_are_not_left_out_if_the_clock_is_wrong(tmp_path):
+    coarse = [f"{i // 10 / 10} {i}{ROW[1:]}" for i in range(400)]
+    with pytest.raises(ValueError, match=r"with equal times differ, .* '-' for the column"):
+        rb.read_path(written(tmp_path, "a.txt", "\n".join([*coarse, ""])), skip="repeated")
+    again = [f"{i // 10 / 10} {i // 10}{ROW[1:]}" for i in range(400)]  # sent ten times
+    again = written(tmp_path, "c.txt", "\n".join([*again, ""]))
+    assert len(rb.read_path(again, skip="repeated")[0]) == 40
+    back = "".join(f"{i / 100 - 0.5 * (i > 200)} {ROW}\n" for i in range(400))
+    with pytest.raises(ValueError, match=r"line 202: the clock was set back"):
+        rb.read_path(written(tmp_path, "b.txt", back), skip=("unordered", "repeated"))
 
 
 def test_bad_arguments_are_named(tmp_path):
