@@ -3,7 +3,7 @@
 A function returns a `Drawing`: its ``figure`` is a Matplotlib figure, its ``data`` are the plotted
 numbers, and ``figure_4(w1=[0.5, 1, 7]).write("mine")`` writes PNG, PDF and CSV to the folder
 ``mine``. The command ``python -m rbcourse.paper 4c --w1 0.5 1 7 --folder mine`` does the same, and
-``python -m rbcourse all --folder mine`` draws every figure of both texts.
+writes the costs as text. ``python -m rbcourse all --folder mine`` draws all figures of both texts.
 
 Parameters
 ----------

@@ -92,10 +92,13 @@ def test_the_command_draws_figures_into_files(tmp_path, capsys):
     words = ["--w1", "0.5", "-1e0", "7", "4c", "--folder", str(tmp_path / "mine")]
     run("rbcourse.paper", paper.FIGURES, words)
     said = capsys.readouterr().out
-    assert "paper_fig4c: png, pdf, csv" in said
+    assert "paper_fig4c: png, pdf, csv, txt" in said
     assert "The optimal rotation costs" in " ".join(said.split())
     files = sorted(path.name for path in (tmp_path / "mine").iterdir())
-    assert files == ["paper_fig4c.csv", "paper_fig4c.pdf", "paper_fig4c.png"]
+    assert files == [f"paper_fig4c.{kind}" for kind in ("csv", "pdf", "png", "txt")]
+    text = (tmp_path / "mine" / "paper_fig4c.txt").read_text("utf-8")
+    assert text.startswith("python -m rbcourse.paper --w1 0.5 -1e0 7 4c --folder ")
+    assert "The optimal rotation costs" in " ".join(text.split())
     written = (tmp_path / "mine" / "paper_fig4c.csv").read_text("utf-8")
     assert written == csv_text(paper.figure_4(w1=[0.5, -1, 7]).data)
     run(

@@ -185,6 +185,7 @@ Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,
 1,0.010000,,,,,,,,
 2,0.020000,{XYZW.replace(" ", ",")},{D},0.000214
 """
+UR = "time,x,y,z,rx,ry,rz\n0.0,0.4,0,0.2,0,3.1,0\n0.1,0.4,0,0.3,0,3.1,0.2\n"
 VICON = """\
 Objects
 100

@@ -21,7 +21,7 @@ import yaml
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 from packaging.utils import canonicalize_name as canonical
-from test_recordings import MOTIVE, VICON
+from test_recordings import MOTIVE, UR, VICON
 
 import course
 import rbclassroom
@@ -97,6 +97,7 @@ def test_examples_in_documents_run(document, tmp_path, monkeypatch):
     shutil.copy(ROOT / "docs/recording.txt", tmp_path)
     (tmp_path / "motive.csv").write_text(MOTIVE)
     (tmp_path / "vicon.csv").write_text(VICON)
+    (tmp_path / "ur.csv").write_text(UR)
     monkeypatch.chdir(tmp_path)
     options = {"optionflags": doctest.NORMALIZE_WHITESPACE, "encoding": "utf-8"}
     failed, tried = doctest.testfile(str(ROOT / document), module_relative=False, **options)

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from rbcourse.draw.animate import Animation, Update, frame_picture, render, save_animation
 from rbcourse.draw.display import Player
 from rbcourse.draw.save import Picture, Table, as_png, csv_text, save_figure, write_figure
+from rbcourse.files import replace_file
 from rbcourse.optimum import ConvergenceError
 
 _NEGATIVE = re.compile(r"-[\d.]+(e[+-]?\d+)?", re.I)
@@ -106,7 +107,8 @@ def run(
     parser = argparse.ArgumentParser(
         prog=f"python -m {module}",
         usage=f"python -m {module} FIGURE [FIGURE ...] [--folder FOLDER] [options]",
-        description="Draw figures as PNG and PDF, and write their numbers as CSV.",
+        description="Draw figures as PNG and PDF, and write their numbers as CSV, and a description "
+        "with the costs as text.",
         epilog="A name without its last letter stands for all its panels. Options replace the "
         "numbers of the text. Existing files of the same name are replaced.",
     )
@@ -139,9 +141,12 @@ def run(
             drawing.write(folder)
         except (ValueError, OSError, ConvergenceError) as error:
             parser.error(str(error))
-        print(f"{Path(folder, drawing.name)}: png, pdf, csv", flush=True)
+        told = textwrap.fill(drawing.alt, 96)
+        text = f"python -m {module} {' '.join(map(str, words))}\n\n{told}\n"
+        replace_file(Path(folder, f"{drawing.name}.txt"), text.encode())
+        print(f"{Path(folder, drawing.name)}: png, pdf, csv, txt", flush=True)
         if "all" not in asked:
-            print(textwrap.indent(textwrap.fill(drawing.alt, 96), "    "), flush=True)
+            print(textwrap.indent(told, "    "), flush=True)
 
 
 def _options(draw: Callable[..., Drawing]) -> set[str]:
