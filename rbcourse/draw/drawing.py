@@ -107,7 +107,7 @@ def run(
     parser = argparse.ArgumentParser(
         prog=f"python -m {module}",
         usage=f"python -m {module} FIGURE [FIGURE ...] [--folder FOLDER] [options]",
-        description="Draw figures as PNG and PDF, and write their numbers as CSV, and a description "
+        description="Draw figures as PNG and PDF, write their numbers as CSV, and a description "
         "with the costs as text.",
         epilog="A name without its last letter stands for all its panels. Options replace the "
         "numbers of the text. Existing files of the same name are replaced.",
