@@ -6,6 +6,8 @@ try:
 except ImportError as error:
     raise SystemExit("\n".join([str(error), *getattr(error, "__notes__", [])])) from None
 
+FIGURES = {f"BK{name}": draw for name, draw in paper.FIGURES.items()}
+FIGURES |= {f"RR{name}": draw for name, draw in report.FIGURES.items()}
+
 if __name__ == "__main__":
-    texts = {"BK": paper.FIGURES, "RR": report.FIGURES}
-    run("rbcourse", {text + name: draw for text in texts for name, draw in texts[text].items()})
+    run(FIGURES)

@@ -91,6 +91,7 @@ _BODIES = "child_frame_id", "frame_id", "device_id", "vehiclename", "vehicle", "
 _COUNTERS = "id", "name"
 """Names of columns that tell which of several bodies a row belongs to; in each row of one body, the
 last two may have another value."""
+_SWITCH = {"True", "true", "False", "false", ""}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DATE = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(\.\d+)?\s*(Z|[+-]\d\d:?\d\d)?", re.ASCII)
 """A date with a time, as in ISO 8601: the second, its fraction, and the time zone."""
@@ -153,7 +154,7 @@ def read_recording(
     else:
         columns, stated, length = _unnamed(rows, form, timed), None, 1.0
     _check_times(rows, columns, timed)
-    _check_one_body(rows)
+    _check_one_body(rows, columns)
     if rate is not None and unit is not None:
         raise ValueError("unit: not with rate, which is in Hz")
     euroc = form == "euroc" or any(name.lower().startswith("p_rs_r") for name in rows.names)
@@ -223,6 +224,9 @@ def _increasing(
             lost = sum(later <= last for later in stamps[number:])
             if kind == "unordered" and lost > max(10, _FEW * len(stamps)):
                 cure = _SET_BACK
+                wrong, *earlier = [*ordered][:-3:-1]
+                if all(ordered[k] < stamp for k in earlier):
+                    cure = f"the time in line {rows.lines[wrong]} may be wrong; delete this line"
             if constant:
                 cure = "all times are equal, so they are not the times of the poses"
             raise ValueError(
@@ -590,8 +594,28 @@ def _check_times(rows: _Rows, columns: Columns, timed: bool) -> None:
         )
 
 
-def _check_one_body(rows: _Rows) -> None:
-    """Refuse rows of several bodies, such as frames of ROS."""
+def _check_one_body(rows: _Rows, columns: Columns) -> None:
+    """Refuse rows of several bodies, such as frames of ROS.
+
+    Also if a column that is not read has a few words, or has numbers and the name of an id, and
+    changes in a quarter of the rows: a state of the recording changes less often.
+    """
+    for i, name in enumerate(rows.names):
+        if i in columns.values() or name.lower() in _COUNTERS or not _words(name):
+            continue
+        cells = [
+            c.strip() for text in rows.texts[:2000] for c in text.split(rows.separator)[i : i + 1]
+        ]
+        changes = sum(one != other for one, other in pairwise(cells))
+        values = {*cells}
+        few = 1 < len(values) <= min(20, len(cells) // 3) and not values <= _SWITCH
+        named = _words(name)[-1:] == ["id"] or not any(map(_NUMBER.fullmatch, cells))
+        if few and named and changes > len(cells) / 4:
+            some = ", ".join(sorted(values)[:3])
+            raise ValueError(
+                f"{rows.file}: {name!r} changes between a few values ({some}), so the rows may be "
+                "of several bodies; keep the rows of one, or name the column '-' in format="
+            )
     for i, name in enumerate(rows.names):
         if name.lower().rpartition(".")[2] in (*_BODIES, *_COUNTERS):
             values = {text.split(rows.separator)[i].strip() for text in rows.texts}

@@ -2,7 +2,7 @@
 
 A function returns a `Drawing`: its ``figure`` is a Matplotlib figure, its ``data`` are the plotted
 numbers, and ``figure_4(w1=[0.5, 1, 7]).write("mine")`` writes PNG, PDF and CSV to the folder
-``mine``. The command ``python -m rbcourse.paper 4c --w1 0.5 1 7 --folder mine`` does the same, and
+``mine``. The command ``python -m rbcourse BK4c --w1 0.5 1 7 --folder mine`` does the same, and
 writes the costs as text. ``python -m rbcourse all --folder mine`` draws all figures of both texts.
 
 Parameters
@@ -29,7 +29,7 @@ from rbcourse._numerics import Array
 from rbcourse.curves.cost import acceleration_cost, acceleration_cost_parts
 from rbcourse.curves.projected import projected_cubic
 from rbcourse.draw import bodies, coordinates, families
-from rbcourse.draw.drawing import Drawing, run, style
+from rbcourse.draw.drawing import Drawing, style
 from rbcourse.draw.save import Table
 from rbcourse.optimum.two_poses import minimum_acceleration
 from rbcourse.se3 import pose_from_components, pose_from_coordinates, twist_from_rates
@@ -272,6 +272,3 @@ FIGURES: dict[str, Callable[..., Drawing]] = {
     "5b": partial(figure_5, "b"),
 }
 """The functions of the figures by their names."""
-
-if __name__ == "__main__":
-    run("rbcourse.paper", FIGURES)

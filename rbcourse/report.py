@@ -4,7 +4,7 @@
 lessons, since the report prints no numbers for them. A function returns a
 `rbcourse.draw.drawing.Drawing`: its ``figure`` is a Matplotlib figure, its ``data`` are the plotted
 numbers, and ``figure_4(rng=7).write("mine")`` writes PNG, PDF and CSV to the folder ``mine``. The
-command ``python -m rbcourse.report 4 --rng 7 --folder mine`` does the same. `visualize` and the
+command ``python -m rbcourse RR4 --rng 7 --folder mine`` does the same. `visualize` and the
 other functions of the report draw any sample and any path.
 
 Arguments that the report does not have are keyword-only. For inputs of a wrong shape or with
@@ -68,7 +68,7 @@ from rbcourse.arm import LINKS, interpolate_joints, propagate_joints
 from rbcourse.draw.animate import Animation, Update, animate
 from rbcourse.draw.arm import describe_arm, moving_arm
 from rbcourse.draw.arm import path_table as joint_table
-from rbcourse.draw.drawing import Drawing, run, style
+from rbcourse.draw.drawing import Drawing, style
 from rbcourse.draw.plane import describe_route, extent_of, moving_route
 from rbcourse.draw.plane import path_table as route_table
 from rbcourse.draw.spheres import (
@@ -620,6 +620,3 @@ def _rotation_vector(rotation: ArrayLike) -> Array:
 
 for _name in __all__:
     described_by(__doc__)(globals()[_name])
-
-if __name__ == "__main__":
-    run("rbcourse.report", FIGURES)

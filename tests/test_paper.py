@@ -10,6 +10,7 @@ from shown import FIGURES, numbers
 
 import rbcourse as rb
 from rbcourse import paper, report
+from rbcourse.__main__ import FIGURES as COMMAND
 from rbcourse.draw.drawing import run
 from rbcourse.draw.save import csv_text
 
@@ -89,31 +90,29 @@ def test_bad_arguments_are_named(draw, options, message):
 
 
 def test_the_command_draws_figures_into_files(tmp_path, capsys):
-    words = ["--w1", "0.5", "-1e0", "7", "4c", "--folder", str(tmp_path / "mine")]
-    run("rbcourse.paper", paper.FIGURES, words)
+    words = ["--w1", "0.5", "-1e0", "7", "BK4c", "--folder", str(tmp_path / "mine")]
+    run(COMMAND, words)
     said = capsys.readouterr().out
     assert "paper_fig4c: png, pdf, csv, txt" in said
     assert "The optimal rotation costs" in " ".join(said.split())
     files = sorted(path.name for path in (tmp_path / "mine").iterdir())
     assert files == [f"paper_fig4c.{kind}" for kind in ("csv", "pdf", "png", "txt")]
     text = (tmp_path / "mine" / "paper_fig4c.txt").read_text("utf-8")
-    assert text.startswith("python -m rbcourse.paper --w1 0.5 -1e0 7 4c --folder ")
+    assert text.startswith("python -m rbcourse --w1 0.5 -1e0 7 BK4c --folder ")
     assert "The optimal rotation costs" in " ".join(text.split())
     written = (tmp_path / "mine" / "paper_fig4c.csv").read_text("utf-8")
     assert written == csv_text(paper.figure_4(w1=[0.5, -1, 7]).data)
-    run(
-        "rbcourse.report", report.FIGURES, ["6", "--goal", "4", "2", "1", "--folder", str(tmp_path)]
-    )
+    run(COMMAND, ["RR6", "--goal", "4", "2", "1", "--folder", str(tmp_path)])
     assert (tmp_path / "report_fig6.pdf").exists()
     for words, message in {
-        "6 --folder x": "FIGURE: one of 1, 2a, .*5b or all is wanted, got 6",
-        "2a --w1 1 2 3": "figure 2a has no option --w1",
-        "4c --w1 1 2": "argument --w1: expected 3 arguments",
-        "5a --d0_dot 1 2": "argument --d0_dot: expected 3 arguments",
-        "2a --angles 1": "angles: two or more increasing",
+        "6 --folder x": "FIGURE: one of BK1, BK2a, .*RR9 or all is wanted, got 6",
+        "BK2a --w1 1 2 3": "figure BK2a has no option --w1",
+        "BK4c --w1 1 2": "argument --w1: expected 3 arguments",
+        "BK5a --d0_dot 1 2": "argument --d0_dot: expected 3 arguments",
+        "BK2a --angles 1": "angles: two or more increasing",
     }.items():
         with pytest.raises(SystemExit):
-            run("rbcourse.paper", paper.FIGURES, [*words.split(), "--folder", str(tmp_path / "no")])
+            run(COMMAND, [*words.split(), "--folder", str(tmp_path / "no")])
         assert re.search(message, capsys.readouterr().err)
     assert not (tmp_path / "no").exists()
 

@@ -522,6 +522,39 @@ def test_columns_that_contradict_each_other_are_refused(tmp_path, names, stamp, 
 
 
 @pytest.mark.parametrize(
+    ("name", "cells", "accepted"),
+    [
+        ("tracker", ["A", "B"], False),
+        ("rigid_body", ["head", "hand", "hand"], False),
+        ("marker_id", ["7", "3"], False),
+        ("satellites", ["7", "8"], True),
+        ("state", ["OK"] * 20 + ["LOST"] * 5, True),
+        ("note", [f"row{i}" for i in range(60)], True),
+        ("marker_id", ["7"], True),
+        ("keyframe", ["true", "false"], True),
+        ("-", ["A", "B"], True),
+    ],
+)
+def test_rows_of_two_bodies_in_turn_are_refused(tmp_path, name, cells, accepted):
+    rows = [f"{i / 100},{ROWS},{cells[i % len(cells)]}" for i in range(60)]
+    file = written(tmp_path, "a.csv", "\n".join([f"{OWN},{name}", *rows, ""]))
+    if accepted:
+        assert len(rb.read_path(file)[0]) == 60
+        return
+    with pytest.raises(
+        ValueError, match=rf"'{name}' changes between a few values \({min(cells)}, "
+    ):
+        rb.read_path(file)
+
+
+def test_one_time_that_is_far_ahead_is_named(tmp_path):
+    rows = [f"{i / 100 + 3600 * (i == 50)} {ROW}" for i in range(200)]
+    file = written(tmp_path, "a.txt", "\n".join([*rows, ""]))
+    with pytest.raises(ValueError, match="the time in line 51 may be wrong; delete this line"):
+        rb.read_path(file)
+
+
+@pytest.mark.parametrize(
     "names",
     [
         "head_pos_x,head_pos_y,head_pos_z,hand_rot_w,hand_rot_x,hand_rot_y,hand_rot_z",

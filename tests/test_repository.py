@@ -284,7 +284,7 @@ def test_documents_name_the_tasks_and_options_that_exist():
     known = {"--depth", "--install", "--privileged"}  # of git, wsl and docker
     for task in course.TASKS:
         known.update(*(action.option_strings for action in options.parser(task)._actions))
-    known |= {"--folder", *(f"--{name}" for name in OPTIONS)}  # of python -m rbcourse.paper
+    known |= {"--folder", *(f"--{name}" for name in OPTIONS)}  # of python -m rbcourse
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z0-9-]*", text)) <= known
     tasks = re.findall(r"course\.py ([a-z]+)", text + read("CONTRIBUTING.md"))
     assert set(tasks) == set(course.TASKS)

@@ -107,7 +107,10 @@ def test_velocity_and_acceleration_are_continuous(data, make):
             rate = c(FINE[1:-1], order + 1)
             middle = np.abs(FINE[1:-1, None] - T).min(axis=1) > 2 * step
             assert np.abs((later - before) / (2 * step) - rate)[middle].max() < 1e-6
-    rest = make(T, data, "rest")
+    with pytest.warns(
+        RuntimeWarning, match=r"^ends: the body \w+ at the (first|last) pose, so it is"
+    ):
+        rest = make(T, data, "rest")
     assert np.abs(rest(T[[0, -1]], 1)).max() < 1e-12
 
 
@@ -213,6 +216,15 @@ def test_the_loop_finds_wrong_poses_of_rounded_recordings_with_long_rests(decima
     assert len(wrong) < 100  # where the motion begins and ends, its acceleration jumps
 
 
+@pytest.mark.parametrize("still", ["turns", "origins"])
+def test_the_loop_works_for_bodies_that_only_turn_or_only_move(still):
+    rng, t = np.random.default_rng(9), np.linspace(0, 6, 600)
+    x = np.sin(t)[:, None] * [0.5, 0.2, 0.1, 0.3, 0.4, 0] + 1e-4 * rng.normal(size=(600, 6))
+    x[:, : 3 if still == "turns" else 6][:, (0 if still == "turns" else 3) :] = 0
+    x[200] += 0.1 * (x[300] != 0)
+    assert np.flatnonzero(~found_by_the_loop(t, rb.pose_from_coordinates(x))).tolist() == [200]
+
+
 def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
     """The first poses accelerate, where natural ends do not follow them."""
     rng, t = np.random.default_rng(7), np.linspace(0, 10, 301)
@@ -273,12 +285,32 @@ def test_motions_whose_velocity_jumps_have_no_wrong_poses(step, noise):
         rb.smoothing_spline(t, poses, period=max(1, 10 * step))
 
 
-def test_an_end_that_does_not_rest_is_told():
-    rng, t = np.random.default_rng(6), np.linspace(0, 4, 400)
-    poses = rb.exp_so3(t[:, None] * [0, 0, 5] + 0.001 * rng.normal(size=(400, 3)))
-    said = r"^poses\[(\d|39\d)\] .* from the curve as usual, or the body does not rest there"
-    with pytest.warns(RuntimeWarning, match=said):
-        rb.smoothing_spline(t, poses, "rest")
+@pytest.mark.parametrize("speed", [0.1, 1, 10])
+@pytest.mark.parametrize("period", [None, 0.5])
+def test_an_end_that_does_not_rest_is_told(speed, period):
+    rng, t = np.random.default_rng(6), np.linspace(0, 4, 401)
+    steady = speed * t[:, None] * [0, 0, 1, 1, 0, 0] + 1e-3 * speed * rng.normal(size=(401, 6))
+    until = np.minimum(steady, 3 * speed)  # at rest for the last second
+    with pytest.warns(RuntimeWarning) as told:
+        rb.smoothing_spline(t, rb.pose_from_coordinates(until), "rest", period=period)
+    ends = [str(each.message) for each in told if str(each.message).startswith("ends:")]
+    assert [x.removeprefix("ends: the body ").partition(",")[0] for x in ends] == [
+        "turns at the first pose",
+        "moves at the first pose",
+    ]
+
+
+@pytest.mark.parametrize("noise", [0, 1e-5, 1e-3])
+def test_ends_at_rest_are_not_called_moving(noise):
+    rng, t = np.random.default_rng(8), np.linspace(0, 4, 401)
+    u = t / 4
+    for way in (0 * t, 3 * u**2 - 2 * u**3, 10 * u**3 - 15 * u**4 + 6 * u**5, np.maximum(t - 1, 0)):
+        moves = way[:, None] * [0.2, 0.5, 0, 1, 0, 0.3] * (t < 3)[:, None]
+        poses = rb.pose_from_coordinates(moves + noise * rng.normal(size=(401, 6)))
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            rb.smoothing_spline(t[:300], poses[:300], "rest", period=0.3)
+        assert not [x for x in told if "the last pose" not in str(x.message)]
 
 
 @pytest.mark.parametrize("rests", [0, 900])

@@ -142,7 +142,8 @@ def smoothing_spline(
             turn = angle_between(S[:, :3, :3], poses[:, :3, :3])
             move = np.linalg.norm(S[:, :3, 3] - poses[:, :3, 3], axis=1)
             # without poses at rest, whose errors may be 0, three quarters are nearer than 1
-            off = np.max([x / np.quantile(x[x > 1e-9], 0.75) for x in (turn, move)], axis=0)
+            some = [x / np.quantile(x[x > 1e-9], 0.75) for x in (turn, move) if x.max() > 1e-9]
+            off = np.max(some, axis=0)
             w = 1.2 / np.clip(off, 1.2, 1e5)
         good = off < 4
 

@@ -95,18 +95,16 @@ def style() -> AbstractContextManager[None]:
     return context
 
 
-def run(
-    module: str, figures: Mapping[str, Callable[..., Drawing]], words: Sequence[str] | None = None
-) -> None:
-    """Draw the figures that a command line names into files; `module` is for the help.
+def run(figures: Mapping[str, Callable[..., Drawing]], words: Sequence[str] | None = None) -> None:
+    """Draw the figures that a command line names into files.
 
     Keyword-only parameters of the functions are options. By default, the command line is that of
     the program.
     """
     options = {name: _options(draw) for name, draw in figures.items()}
     parser = argparse.ArgumentParser(
-        prog=f"python -m {module}",
-        usage=f"python -m {module} FIGURE [FIGURE ...] [--folder FOLDER] [options]",
+        prog="python -m rbcourse",
+        usage="python -m rbcourse FIGURE [FIGURE ...] [--folder FOLDER] [options]",
         description="Draw figures as PNG and PDF, write their numbers as CSV, and a description "
         "with the costs as text.",
         epilog="A name without its last letter stands for all its panels. Options replace the "
@@ -142,7 +140,7 @@ def run(
         except (ValueError, OSError, ConvergenceError) as error:
             parser.error(str(error))
         told = textwrap.fill(drawing.alt, 96)
-        text = f"python -m {module} {' '.join(map(str, words))}\n\n{told}\n"
+        text = f"python -m rbcourse {' '.join(map(str, words))}\n\n{told}\n"
         replace_file(Path(folder, f"{drawing.name}.txt"), text.encode())
         print(f"{Path(folder, drawing.name)}: png, pdf, csv, txt", flush=True)
         if "all" not in asked:
