@@ -25,6 +25,7 @@ Columns: TypeAlias = dict[str, int]
 
 POSITION, QUATERNION = ["x", "y", "z"], ["qw", "qx", "qy", "qz"]
 MATRIX = [f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
+ONE_BASED = {f"r{i}{j}": f"r{i + 1}{j + 1}" for i in (0, 1, 2) for j in (0, 1, 2)}
 FORMATS = {
     "csv": ["time", *POSITION, *QUATERNION],
     "euroc": ["time", *POSITION, *QUATERNION],
@@ -57,7 +58,7 @@ _MEANINGS = {
     r"(?P<axis>[xyz])(_(p|pos|position))?",
     "q": r"((.*_)?(quat|quaternion|orientation|rot|rotation|attitude)|(.*_)?q(_[a-z]{1,2}){0,2})_?"
     r"(?P<axis>[wxyz])",
-    "r": r"((.*_)?(pose|rot|rotation)_)?r_?(?P<axis>[123]{2})",
+    "r": r"((.*_)?(pose|rot|rotation)_)?r_?(?P<axis>[0-3]{2})",
 }
 """The meanings of columns, by their names in small letters, with _ between words and no unit.
 
@@ -78,7 +79,7 @@ _PART_OF_TIME = re.compile(
 """Names of columns that hold a part of the time, beside a column of seconds."""
 _KIND = re.compile(
     r"pose|pos|position|trans|translation|location|quat|quaternion|orientation|rot|rotation"
-    r"|attitude|p|q|(t|p|q|pos|rot|quat)?[wxyz]|r|r?[123]{2}"
+    r"|attitude|p|q|(t|p|q|pos|rot|quat)?[wxyz]|r|r?[0-3]{2}"
 )
 """Words in the names of columns that do not name a body or a frame."""
 _ORDER = re.compile(
@@ -473,6 +474,13 @@ def _named(rows: _Rows, form: str | None, unit: str | None) -> tuple[Columns, st
         if meaning:
             found.setdefault(meaning, []).append(i)
             units[meaning] = named
+    if "r00" in found:  # the indices begin with 0
+        if "r33" in found:
+            raise ValueError(
+                f"{rows.file}: r00 to r22 or r11 to r33 are wanted, got r00 and r33; format= may "
+                "be a list of names for all columns, with '-' for those that are not read"
+            )
+        found = {ONE_BASED.get(meaning, meaning): places for meaning, places in found.items()}
     if "time" not in found and not rows.names[0] and _has_dates(rows, 0):
         found["time"] = [0]  # the index of pandas
     if "nanoseconds" in found and "time" not in found:

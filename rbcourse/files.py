@@ -157,13 +157,13 @@ def read_path(
 
     The content of the file tells its format, not its name. If a line, which may be a comment, names
     the columns, then the names tell which column has the time, x, y, z, and the components of the
-    quaternion or of the matrix (r11 to r33); units such as [ns] or [mm] in the names are converted.
-    Other columns are not read, except those of velocities that `write_path` wrote. Without names, 8
-    columns separated by white space are TUM (time, position, quaternion (x, y, z, w)), and 12 are
-    the first three rows of a pose (KITTI). Columns are separated by commas, semicolons, tabs or
-    blanks. If semicolons separate them, decimals may have commas. Blank lines and comments, which
-    begin with #, may be anywhere. Each rotation is replaced by the nearest one. A malformed file is
-    rejected as a whole.
+    quaternion or of the matrix (r11 to r33, or r00 to r22); units such as [ns] or [mm] in the names
+    are converted. Other columns are not read, except those of velocities that `write_path` wrote.
+    Without names, 8 columns separated by white space are TUM (time, position, quaternion (x, y, z,
+    w)), and 12 are the first three rows of a pose (KITTI). Columns are separated by commas,
+    semicolons, tabs or blanks. If semicolons separate them, decimals may have commas. Blank lines
+    and comments, which begin with #, may be anywhere. Each rotation is replaced by the nearest one.
+    A malformed file is rejected as a whole.
 
     Parameters
     ----------

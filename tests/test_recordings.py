@@ -327,12 +327,21 @@ def test_given_names_replace_those_of_the_file(tmp_path):
             rb.read_path(file, format=wrong)
 
 
+@pytest.mark.parametrize("first", [0, 1])
 @pytest.mark.parametrize("form", ["R{}", "r{} [1]", "pose.r_{}"])
-def test_names_of_the_entries_of_a_matrix_are_known(tmp_path, form):
-    names = [form.format(f"{i}{j}") for j in (1, 2, 3) for i in (1, 2, 3)]  # by columns
+def test_names_of_the_entries_of_a_matrix_are_known(tmp_path, form, first):
+    indices = range(first, first + 3)
+    names = [form.format(f"{i}{j}") for j in indices for i in indices]  # by columns
     numbers = [*P[:3, :3].T.ravel().tolist(), *P[:3, 3].tolist()]
     text = f"t,{','.join(names)},x,y,z\n0,{','.join(map(str, numbers))}\n"
     assert np.abs(rb.read_path(written(tmp_path, "a.csv", text))[1] - P).max() < 1e-15
+
+
+def test_names_of_all_entries_of_a_pose_are_refused(tmp_path):
+    names = [f"r{i}{j}" for i in range(4) for j in range(4)]
+    file = written(tmp_path, "a.csv", f"t,{','.join(names)}\n0,{','.join('1' * 16)}\n")
+    with pytest.raises(ValueError, match="got r00 and r33; format= may be a list"):
+        rb.read_path(file)
 
 
 def test_times_in_a_second_file_are_exact(tmp_path):
