@@ -138,7 +138,7 @@ class BoxedExecute(BoundedClient, nbgrader.Execute):
             faults += ["takes too much memory"] * ("MemoryError" in errors)
             if is_answer(cell) and not faults:
                 wrong = errors - {"NotImplementedError"}  # of an answer that was not begun
-                faults += [f"ends with {name[:60]}" for name in sorted(wrong)]
+                faults += [f"shows {name[:60]}" for name in sorted(wrong)]
             remarks += [f"{name_cell(nb.cells, at)}: {fault}" for fault in faults]
             if at in self.slow:  # replace the traceback, which may quote tests
                 outputs[:] = [output for output in outputs if output.output_type != "error"]

@@ -93,7 +93,7 @@ CLASS = [
         tamper,
         {"half": "half = squar(3)"},
         "2 0",
-        ["is a copy; another one counts", "more", "“A tiny set”: ends with NameError"],
+        ["is a copy; another one counts", "more", "“A tiny set”: shows NameError"],
     ),
     ("half right", None, {"square": DOUBLE, "half": HUGE}, "0 0", [f"{HALF}: takes too much"]),
     ("endless", None, {"square": LOOP, "half": LOUD}, "0 1", [f"{SQUARE}: stopped", f"{HALF}: st"]),

@@ -163,7 +163,7 @@ LOOP, FLOOD = (f"{begun()}\nwhile True: {what}" for what in ("pass", "print('x' 
 # Each row has a student, a change, answers, points (none if refused), and how the remark begins;
 # with None, every remark is accepted.
 CLASS = [
-    ("honest", None, {"half": HONEST + HALF}, "2 1", ""),
+    ("honest", None, {"half": HONEST + HALF}, "2 1", f"{CELL_5}: shows TypeError"),
     ("sneaks", None, {"half": TRIED + HALF}, "2 1", None),
     ("hides", None, {"half": HIDES + HALF}, "2 1", None),
     ("shows", None, {"half": SHOWS + HALF}, "2 1", f"{CELL_5}: the output is too large"),
