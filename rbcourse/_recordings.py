@@ -194,11 +194,11 @@ def read_recording(
         _check_unit(rows.place(kept[0]), stamps, known)
     ordered, more = _increasing(rows, kept, stamps, skip)
     moved = sum(not np.array_equal(table[i], table[i - 1]) for i in more["repeated"])
-    if moved > len(kept) / 2:
+    if moved > 0.3 * len(kept):
         raise ValueError(
-            f"{file}: poses with equal times differ, and more than half of the rows would be left "
-            "out, so the clock has too few digits; format= may be a list of names with '-' for the "
-            "column of the times, and then rate= or times= gives them"
+            f"{file}: {moved} of {len(kept)} rows have the time of a row before and another pose, "
+            "so they may be of several bodies, or the clock has too few digits; if format= is a list "
+            "of names with '-' for the column of the times, rate= or times= gives other times"
         )
     for kind, which in {"nan": dropped, **more}.items():
         if which:
@@ -226,7 +226,7 @@ def _increasing(
             if kind == "unordered" and lost > max(10, _FEW * len(stamps)):
                 cure = _SET_BACK
                 wrong, *earlier = [*ordered][:-3:-1]
-                if all(ordered[k] < stamp for k in earlier):
+                if earlier and ordered[earlier[0]] < stamp:
                     cure = f"the time in line {rows.lines[wrong]} may be wrong; delete this line"
             if constant:
                 cure = "all times are equal, so they are not the times of the poses"

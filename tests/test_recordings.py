@@ -429,11 +429,17 @@ def test_skipped_rows_are_left_out_and_told(tmp_path, caplog):
 
 def test_rows_are_not_left_out_if_the_clock_is_wrong(tmp_path):
     coarse = [f"{i // 10 / 10} {i}{ROW[1:]}" for i in range(400)]
-    with pytest.raises(ValueError, match=r"with equal times differ, .* '-' for the column"):
+    with pytest.raises(ValueError, match=r"360 of 400 rows have the time of .* several bodies, or"):
         rb.read_path(written(tmp_path, "a.txt", "\n".join([*coarse, ""])), skip="repeated")
     again = [f"{i // 10 / 10} {i // 10}{ROW[1:]}" for i in range(400)]  # sent ten times
     again = written(tmp_path, "c.txt", "\n".join([*again, ""]))
     assert len(rb.read_path(again, skip="repeated")[0]) == 40
+    two = [f"{i // 2 / 100} {i % 2}{ROW[1:]}" for i in range(400)]
+    with pytest.raises(ValueError, match=r"200 of 400 rows have the time of .* several bodies, or"):
+        rb.read_path(written(tmp_path, "d.txt", "\n".join([*two, ""])), skip="repeated")
+    reverse = "".join(f"{4 - i / 100} {ROW}\n" for i in range(400))
+    with pytest.raises(ValueError, match=r"line 2: .* or the rows are in another order"):
+        rb.read_path(written(tmp_path, "e.txt", reverse))
     back = "".join(f"{i / 100 - 0.5 * (i > 200)} {ROW}\n" for i in range(400))
     with pytest.raises(ValueError, match=r"line 202: the clock was set back"):
         rb.read_path(written(tmp_path, "b.txt", back), skip=("unordered", "repeated"))

@@ -300,6 +300,49 @@ def test_an_end_that_does_not_rest_is_told(speed, period):
     ]
 
 
+def moving_and_resting(rng):
+    t = np.arange(2000) / 100
+    way = np.clip(np.sin(t), -0.5, 1)[:, None] * [0.2, 0.5, 0, 1, 0, 0.3]
+    return t, rb.exp_se3(way + 1e-3 * rng.normal(size=(2000, 6)))
+
+
+@pytest.mark.parametrize("kind", ["25 Hz", "50 Hz", "some"])
+def test_poses_that_a_tracker_repeats_are_announced(kind):
+    rng = np.random.default_rng(10)
+    t, poses = moving_and_resting(rng)
+    last = np.arange(2000)
+    if kind == "some":
+        last = np.maximum.accumulate(np.where(rng.uniform(size=2000) < 0.3, 0, last))
+    else:
+        last -= last % (100 // int(kind[:2]))
+    held = poses[last]
+    for period in (None, 0.5):
+        with pytest.warns(RuntimeWarning, match=r"^poses: \d+ poses, such as .* new = ") as told:
+            rb.smoothing_spline(t, held, period=period)
+    new = eval(str(told[0].message).rpartition("new = ")[2], {"np": np, "poses": held})
+    c = rb.smoothing_spline(t[new], held[new])
+    assert c.noise == pytest.approx([1e-3, 1e-3], rel=0.15)
+
+
+@pytest.mark.parametrize("decimals", [3, 6])
+def test_equal_poses_of_rounded_rests_are_not_those_of_a_tracker(decimals):
+    t = np.arange(1500) / 100
+    x = np.sin(np.clip(t, 4, 9))[:, None] * [0.5, 0.3, 1, 1, 2, 0.5]
+    x += 0.2 * 10.0**-decimals * np.random.default_rng(1).normal(size=x.shape)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        rb.smoothing_spline(t, rb.pose_from_coordinates(x.round(decimals)))
+    assert not [each for each in told if str(each.message).startswith("poses: ")]
+
+
+def test_times_of_receipt_are_announced():
+    t, poses = moving_and_resting(np.random.default_rng(12))
+    received = np.floor(10 * t) / 10 + np.arange(2000) % 10 * 2e-4
+    said = r"and in 19[0-9] other intervals.* the times may be those at which"
+    with pytest.warns(RuntimeWarning, match=said):
+        rb.smoothing_spline(received, poses)
+
+
 @pytest.mark.parametrize("noise", [0, 1e-5, 1e-3])
 def test_ends_at_rest_are_not_called_moving(noise):
     rng, t = np.random.default_rng(8), np.linspace(0, 4, 401)

@@ -17,12 +17,15 @@ if TYPE_CHECKING:
     from rbcourse.curves.smoothing import Smoother
 
 GAP = 5.0  # usual steps; shorter steps are no gaps [the longest of 1,000 random ones: 3.4 to 8]
+MANY_GAPS = 10  # more are not those of lost poses
 FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
 WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
 OFF_LINE = 5.0  # times the usual distance [noise alone: 3; three poses off by 50 times: 7]
 NEAR = 10  # poses on each side; three quarters of them are within the usual distance
 MOST_SLOPE = 0.75  # of the mean slope [rest for 3 of 20 poses, then steady: 0.7]
 CLEAR = 5.0  # standard errors of the slope at an end [bodies at rest: 2.5]
+STILL = 0.2  # of the largest usual step: a smaller one is that of a body at rest
+MANY_HELD = 0.05  # of the poses
 ROUNDING = 1e-9  # times the largest entry of the poses; smaller errors are those of rounding
 
 
@@ -41,6 +44,8 @@ def warn_of_doubts(
     _check_gaps(smoother, curve.period)
     if smoother.pad:
         _check_rest(smoother, poses)
+    if _check_held(smoother, poses):
+        return
     if weights is None and _check_neighbours(smoother, poses):
         return
     if period is None:
@@ -65,12 +70,42 @@ def _check_gaps(smoother: Smoother, periods: Any) -> None:
     """
     knots, period = smoother.knots, np.min(periods)
     steps = np.diff(knots)
+    gaps = steps > max(period, GAP * usual_step(steps))
+    if not gaps.any():
+        return
     i = np.argmax(steps)
-    if steps[i] > max(period, GAP * usual_step(steps)):
-        _warn(
-            f"times: no pose between {knots[i]:.13g} and {knots[i + 1]:.13g}, longer than the "
-            f"period {period:.3g}, so the motion there is not known; smooth both sides apart"
-        )
+    where = f"between {knots[i]:.13g} and {knots[i + 1]:.13g}"
+    cure = "smooth both sides apart"
+    if gaps.sum() > MANY_GAPS:
+        where += f" and in {gaps.sum() - 1} other intervals"
+        cure = "the times may be those at which the poses were received"
+    _warn(
+        f"times: no pose {where}, longer than the period {period:.3g}, so the motion there is not "
+        f"known; {cure}"
+    )
+
+
+def _check_held(smoother: Smoother, poses: Array) -> bool:
+    """Warn if many poses equal the pose before exactly, although the body moves before and after.
+
+    A tracker that has no new pose may repeat the last one. The body moves if one of the ten steps
+    before, and one of the ten after, is at least a fifth of the usual largest step: the last digits
+    of a body at rest change less.
+    """
+    step = np.abs(np.diff(poses, axis=0)).max(axis=(1, 2))
+    if len(step) < 2 * NEAR or not step.any():
+        return False
+    moves = step > STILL * np.quantile(step[step > 0], 0.95)
+    before, after = _around(moves.astype(float))
+    held = (step == 0) & (np.diff(smoother.which) > 0) & before.any(axis=1) & after.any(axis=1)
+    if held.sum() <= max(NEAR, MANY_HELD * len(step)):
+        return False
+    _warn(
+        f"poses: {held.sum()} poses, such as poses[{np.argmax(held) + 1}], equal the one before, "
+        "while the body moves; if a tracker has repeated its last pose, smooth the new ones alone: "
+        "new = np.append(True, (poses[1:] != poses[:-1]).any((1, 2)))"
+    )
+    return True
 
 
 def _check_rest(smoother: Smoother, poses: Array) -> None:
@@ -133,9 +168,14 @@ def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
 
 def _usual_near(x: Array) -> Array:
     """Return an upper bound of three quarters of the values before or after each one."""
+    before, after = (np.sort(side, axis=1)[:, 3 * NEAR // 4] for side in _around(x))
+    return np.maximum(before, after)
+
+
+def _around(x: Array) -> tuple[Array, Array]:
+    """Return the ten values before each value, and the ten after it; they are reflected at ends."""
     around = sliding_window_view(np.pad(x, NEAR, mode="reflect"), NEAR)
-    usual = np.sort(around, axis=1)[:, 3 * NEAR // 4]
-    return np.maximum(usual[: len(x)], usual[NEAR + 1 :])
+    return around[: len(x)], around[NEAR + 1 :]
 
 
 def _check_noise(smoother: Smoother, periods: Any, noise: ArrayLike | None) -> None:
