@@ -196,8 +196,8 @@ def read_recording(
     moved = sum(not np.array_equal(table[i], table[i - 1]) for i in more["repeated"])
     if moved > 0.3 * len(kept):
         raise ValueError(
-            f"{file}: {moved} of {len(kept)} rows have the time of a row before and another pose, "
-            "so they may be of several bodies, or the clock has too few digits; if format= is a list "
+            f"{file}: {moved} of {len(kept)} rows have the time of a row before, and another pose: "
+            "they may be of several bodies, or the clock has too few digits; if format= is a list "
             "of names with '-' for the column of the times, rate= or times= gives other times"
         )
     for kind, which in {"nan": dropped, **more}.items():
