@@ -178,7 +178,8 @@ def test_the_noise_is_found_and_reduced():
 
 
 def test_a_short_period_interpolates_and_a_long_one_gives_a_steady_turn():
-    c = rb.smoothing_spline(T, NOISY, period=2e-3)
+    with pytest.warns(RuntimeWarning, match=r"^period: 0.002 is shorter than a tenth of a step"):
+        c = rb.smoothing_spline(T, NOISY, period=2e-3)
     assert np.abs(c(T) - NOISY).max() < 1e-8
     spline = rb.quaternion_spline(T, NOISY)
     assert np.abs(c(FINE) - spline(FINE)).max() < 1e-3
@@ -306,13 +307,15 @@ def moving_and_resting(rng):
     return t, rb.exp_se3(way + 1e-3 * rng.normal(size=(2000, 6)))
 
 
-@pytest.mark.parametrize("kind", ["25 Hz", "50 Hz", "some"])
+@pytest.mark.parametrize("kind", ["25 Hz", "50 Hz", "some", "one freeze"])
 def test_poses_that_a_tracker_repeats_are_announced(kind):
     rng = np.random.default_rng(10)
     t, poses = moving_and_resting(rng)
     last = np.arange(2000)
     if kind == "some":
         last = np.maximum.accumulate(np.where(rng.uniform(size=2000) < 0.3, 0, last))
+    elif kind == "one freeze":
+        last[1230:1260] = 1230
     else:
         last -= last % (100 // int(kind[:2]))
     held = poses[last]
@@ -320,7 +323,8 @@ def test_poses_that_a_tracker_repeats_are_announced(kind):
         with pytest.warns(RuntimeWarning, match=r"^poses: \d+ poses, such as .* new = ") as told:
             rb.smoothing_spline(t, held, period=period)
     new = eval(str(told[0].message).rpartition("new = ")[2], {"np": np, "poses": held})
-    c = rb.smoothing_spline(t[new], held[new])
+    with warnings.catch_warnings(action="ignore"):  # the freeze is a gap now
+        c = rb.smoothing_spline(t[new], held[new])
     assert c.noise == pytest.approx([1e-3, 1e-3], rel=0.15)
 
 
@@ -333,6 +337,12 @@ def test_equal_poses_of_rounded_rests_are_not_those_of_a_tracker(decimals):
         warnings.simplefilter("always")
         rb.smoothing_spline(t, rb.pose_from_coordinates(x.round(decimals)))
     assert not [each for each in told if str(each.message).startswith("poses: ")]
+
+
+def test_a_period_in_another_unit_than_the_times_is_announced():
+    t, poses = moving_and_resting(np.random.default_rng(13))
+    with pytest.warns(RuntimeWarning, match=r"^period: 0.5 is shorter than a tenth of a step, "):
+        rb.smoothing_spline(1000 * t, poses, period=0.5)
 
 
 def test_times_of_receipt_are_announced():
@@ -457,7 +467,8 @@ def test_the_costate_of_the_optimum_jumps_by_the_pull_of_the_measurement():
 
 def test_the_optimum_ranges_from_the_interpolating_one_to_the_best_steady_turn():
     t, R = T[:8], wandering(T[:8], 0.4, 0.1)[1]
-    tight = minimum_acceleration_smoothing(t, R, period=1e-2)
+    with pytest.warns(RuntimeWarning, match=r"^period: 0.01 is shorter than a tenth of a step"):
+        tight = minimum_acceleration_smoothing(t, R, period=1e-2)
     through = rb.minimum_acceleration_spline(t, R)
     fine = np.linspace(t[0], t[-1], 99)
     assert np.abs(tight(fine) - through(fine)).max() < 1e-8

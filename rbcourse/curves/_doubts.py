@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 GAP = 5.0  # usual steps; shorter steps are no gaps [the longest of 1,000 random ones: 3.4 to 8]
 MANY_GAPS = 10  # more are not those of lost poses
+SHORTEST = 0.1  # steps: shorter periods have another unit than the times, or pass through all poses
 FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
 WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
 OFF_LINE = 5.0  # times the usual distance [noise alone: 3; three poses off by 50 times: 7]
@@ -26,6 +27,7 @@ MOST_SLOPE = 0.75  # of the mean slope [rest for 3 of 20 poses, then steady: 0.7
 CLEAR = 5.0  # standard errors of the slope at an end [bodies at rest: 2.5]
 STILL = 0.2  # of the largest usual step: a smaller one is that of a body at rest
 MANY_HELD = 0.05  # of the poses
+LONG_RUN, JUMP = 5, 3.0  # equal steps, and the step after them in usual largest steps
 ROUNDING = 1e-9  # times the largest entry of the poses; smaller errors are those of rounding
 
 
@@ -42,6 +44,8 @@ def warn_of_doubts(
     Given weights may be those of a search for wrong poses, so there is no warning of them.
     """
     _check_gaps(smoother, curve.period)
+    if period is not None:
+        _check_period(smoother, curve.period)
     if smoother.pad:
         _check_rest(smoother, poses)
     if _check_held(smoother, poses):
@@ -85,24 +89,39 @@ def _check_gaps(smoother: Smoother, periods: Any) -> None:
     )
 
 
-def _check_held(smoother: Smoother, poses: Array) -> bool:
-    """Warn if many poses equal the pose before exactly, although the body moves before and after.
+def _check_period(smoother: Smoother, periods: Any) -> None:
+    """Warn if a given period is so short that nothing is smoothed."""
+    period, step = np.min(periods), usual_step(np.diff(smoother.knots))
+    if period < SHORTEST * step:
+        _warn(
+            f"period: {period:g} is shorter than a tenth of a step, {step:.3g}, so nothing is "
+            "smoothed, and the noise is not known; times and period have the same unit"
+        )
 
-    A tracker that has no new pose may repeat the last one. The body moves if one of the ten steps
-    before, and one of the ten after, is at least a fifth of the usual largest step: the last digits
-    of a body at rest change less.
+
+def _check_held(smoother: Smoother, poses: Array) -> bool:
+    """Warn if poses equal the pose before exactly, although the body moves.
+
+    A tracker that has no new pose may repeat the last one. Counted are short runs of equal poses
+    that end with at least a fifth of the usual largest step, since the last digits of a body at
+    rest change less. One run, of any length, is enough if the step after it is a jump.
     """
     step = np.abs(np.diff(poses, axis=0)).max(axis=(1, 2))
     if len(step) < 2 * NEAR or not step.any():
         return False
-    moves = step > STILL * np.quantile(step[step > 0], 0.95)
-    before, after = _around(moves.astype(float))
-    held = (step == 0) & (np.diff(smoother.which) > 0) & before.any(axis=1) & after.any(axis=1)
-    if held.sum() <= max(NEAR, MANY_HELD * len(step)):
+    usual = np.quantile(step[step > 0], 0.95)
+    equal = (step == 0) & (np.diff(smoother.which) > 0)
+    ends = np.flatnonzero(~equal)
+    runs = np.diff(ends, prepend=-1) - 1  # the number of equal steps before each end
+    moves = (runs > 0) & (runs < 2 * NEAR) & (step[ends] > STILL * usual)
+    jumps = (runs >= LONG_RUN) & (step[ends] > JUMP * usual)
+    if runs[moves].sum() <= max(NEAR, MANY_HELD * len(step)) and not jumps.any():
         return False
+    found = moves | jumps
+    first = ends[found][0] - runs[found][0] + 1
     _warn(
-        f"poses: {held.sum()} poses, such as poses[{np.argmax(held) + 1}], equal the one before, "
-        "while the body moves; if a tracker has repeated its last pose, smooth the new ones alone: "
+        f"poses: {runs[found].sum()} poses, such as poses[{first}], equal the one before, although "
+        "the body moves; if a tracker has repeated its last pose, smooth the new ones alone: "
         "new = np.append(True, (poses[1:] != poses[:-1]).any((1, 2)))"
     )
     return True

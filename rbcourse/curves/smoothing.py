@@ -115,11 +115,12 @@ def smoothing_spline(
     RuntimeWarning
         If the body turns by more than 1 rad in the time period/2π; if an interval between two times
         is longer than the period and than five usual steps (the motion in this gap is not known;
-        smooth both sides apart, and join them by `chain`); if many poses equal the one before while
-        the body moves; if ends should be at rest, and the body moves there; if, without given
-        weights, a pose is five times as far from the line through its neighbours as is usual near
-        it; or if, without a given period, nothing is smoothed, a pose is ten times as far from the
-        curve as half of the poses are, or cross validation has fewer than ten poses.
+        smooth both sides apart, and join them by `chain`); if a period is shorter than a tenth of a
+        step; if many poses equal the one before while the body moves; if ends should be at rest,
+        and the body moves there; if, without given weights, a pose is five times as far from the
+        line through its neighbours as is usual near it; or if, without a given period, nothing is
+        smoothed, a pose is ten times as far from the curve as half of the poses are, or cross
+        validation has fewer than ten poses.
 
     Notes
     -----
