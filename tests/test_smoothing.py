@@ -339,6 +339,13 @@ def test_equal_poses_of_rounded_rests_are_not_those_of_a_tracker(decimals):
     assert not [each for each in told if str(each.message).startswith("poses: ")]
 
 
+def test_an_exact_rest_at_the_start_is_not_a_frozen_tracker():
+    t = np.arange(200) / 100
+    way = np.maximum(t - 0.15, 0)[:, None] * [0, 0, 1, 1, 0, 0]
+    with warnings.catch_warnings(action="error"):
+        rb.smoothing_spline(t, rb.pose_from_coordinates(way), period=0.2)
+
+
 def test_a_period_in_another_unit_than_the_times_is_announced():
     t, poses = moving_and_resting(np.random.default_rng(13))
     with pytest.warns(RuntimeWarning, match=r"^period: 0.5 is shorter than a tenth of a step, "):
@@ -553,6 +560,13 @@ def test_poses_at_nearly_equal_times_are_averaged(gap):
             assert found.period == pytest.approx(wanted.period, rel=1e-4)
             assert found.noise == pytest.approx(wanted.noise, rel=1e-4)
             assert rb.angle_between(found(again), wanted(again)).max() < 1e-4
+
+
+def test_an_exact_rest_at_the_start_is_not_a_frozen_tracker():
+    t = np.arange(200) / 100
+    way = np.maximum(t - 0.15, 0)[:, None] * [0, 0, 1, 1, 0, 0]
+    with warnings.catch_warnings(action="error"):
+        rb.smoothing_spline(t, rb.pose_from_coordinates(way), period=0.2)
 
 
 def test_a_period_in_another_unit_than_the_times_is_refused():

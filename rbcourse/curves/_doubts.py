@@ -104,7 +104,8 @@ def _check_held(smoother: Smoother, poses: Array) -> bool:
 
     A tracker that has no new pose may repeat the last one. Counted are short runs of equal poses
     that end with at least a fifth of the usual largest step, since the last digits of a body at
-    rest change less. One run, of any length, is enough if the step after it is a jump.
+    rest change less. One run, of any length, is enough if the step after it is a jump. Equal poses
+    at the start may be a rest.
     """
     step = np.abs(np.diff(poses, axis=0)).max(axis=(1, 2))
     if len(step) < 2 * NEAR or not step.any():
@@ -112,7 +113,7 @@ def _check_held(smoother: Smoother, poses: Array) -> bool:
     usual = np.quantile(step[step > 0], 0.95)
     equal = (step == 0) & (np.diff(smoother.which) > 0)
     ends = np.flatnonzero(~equal)
-    runs = np.diff(ends, prepend=-1) - 1  # the number of equal steps before each end
+    runs = np.diff(ends, prepend=ends[0]) - 1  # the number of equal steps before each end
     moves = (runs > 0) & (runs < 2 * NEAR) & (step[ends] > STILL * usual)
     jumps = (runs >= LONG_RUN) & (step[ends] > JUMP * usual)
     if runs[moves].sum() <= max(NEAR, MANY_HELD * len(step)) and not jumps.any():
