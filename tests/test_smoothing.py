@@ -562,13 +562,6 @@ def test_poses_at_nearly_equal_times_are_averaged(gap):
             assert rb.angle_between(found(again), wanted(again)).max() < 1e-4
 
 
-def test_an_exact_rest_at_the_start_is_not_a_frozen_tracker():
-    t = np.arange(200) / 100
-    way = np.maximum(t - 0.15, 0)[:, None] * [0, 0, 1, 1, 0, 0]
-    with warnings.catch_warnings(action="error"):
-        rb.smoothing_spline(t, rb.pose_from_coordinates(way), period=0.2)
-
-
 def test_a_period_in_another_unit_than_the_times_is_refused():
     t = np.linspace(0, 10e6, 100)  # µs
     with pytest.raises(
