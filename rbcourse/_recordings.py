@@ -652,7 +652,9 @@ def _numbers(rows: _Rows, chosen: Sequence[int]) -> Array:
         for k, column in enumerate(chosen):
             if cells[column].lower() not in _MISSING:
                 dated = re.search(r"\d[:/-]\d", cells[column])
-                hint = "; dates are read as in 2026-11-30T10:15:00.5" if dated else ""
+                hint = (
+                    "; all times are wanted as in 2026-11-30T10:15:00.5, or none" if dated else ""
+                )
                 row[k] = to_number(f"{rows.place(i)}, {names[column]}", cells[column], hint)
     return table
 

@@ -90,17 +90,17 @@ def test_bad_arguments_are_named(draw, options, message):
 
 
 def test_the_command_draws_figures_into_files(tmp_path, capsys):
-    words = ["--w1", "0.5", "-1e0", "7", "BK4c", "--folder", str(tmp_path / "mine")]
+    words = ["--w1", "0.5", "-1e0", "7", "BK4c", "--folder", str(tmp_path / "my own")]
     run(COMMAND, words)
     said = capsys.readouterr().out
     assert "paper_fig4c: png, pdf, csv, txt" in said
     assert "The optimal rotation costs" in " ".join(said.split())
-    files = sorted(path.name for path in (tmp_path / "mine").iterdir())
+    files = sorted(path.name for path in (tmp_path / "my own").iterdir())
     assert files == [f"paper_fig4c.{kind}" for kind in ("csv", "pdf", "png", "txt")]
-    text = (tmp_path / "mine" / "paper_fig4c.txt").read_text("utf-8")
-    assert text.startswith("python -m rbcourse --w1 0.5 -1e0 7 BK4c --folder ")
+    text = (tmp_path / "my own" / "paper_fig4c.txt").read_text("utf-8")
+    assert text.startswith("python -m rbcourse --w1 0.5 -1e0 7 BK4c --folder '")
     assert "The optimal rotation costs" in " ".join(text.split())
-    written = (tmp_path / "mine" / "paper_fig4c.csv").read_text("utf-8")
+    written = (tmp_path / "my own" / "paper_fig4c.csv").read_text("utf-8")
     assert written == csv_text(paper.figure_4(w1=[0.5, -1, 7]).data)
     run(COMMAND, ["RR6", "--goal", "4", "2", "1", "--folder", str(tmp_path)])
     assert (tmp_path / "report_fig6.pdf").exists()

@@ -3,6 +3,7 @@
 import argparse
 import inspect
 import re
+import shlex
 import sys
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -140,7 +141,7 @@ def run(figures: Mapping[str, Callable[..., Drawing]], words: Sequence[str] | No
         except (ValueError, OSError, ConvergenceError) as error:
             parser.error(str(error))
         told = textwrap.fill(drawing.alt, 96)
-        text = f"python -m rbcourse {' '.join(map(str, words))}\n\n{told}\n"
+        text = f"python -m rbcourse {shlex.join(words)}\n\n{told}\n"
         replace_file(Path(folder, f"{drawing.name}.txt"), text.encode())
         print(f"{Path(folder, drawing.name)}: png, pdf, csv, txt", flush=True)
         if "all" not in asked:

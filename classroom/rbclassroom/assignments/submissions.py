@@ -53,7 +53,7 @@ def read_notebook(content: bytes, name: str) -> NotebookNode:
         cure = "take an earlier copy, or start again from the handout"
         if b"\n<<<<<<< " in content:
             raise Refused(f"{name} has conflicts of a merge in git (<<<<<<<); {cure}") from error
-        why = f"{type(error).__name__}: {error}"
+        why = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
         if isinstance(error, json.JSONDecodeError):
             why = f"it stops being JSON in line {error.lineno}"
         raise Refused(f"{name} is damaged or not a notebook ({why[:80]}); {cure}") from error

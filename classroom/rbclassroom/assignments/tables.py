@@ -77,12 +77,16 @@ def _problems(path: Path, notebook: Path) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _check_names(file: str, slug: str, problem: dict[str, Any]) -> None:
+def _check_names(file: str, slug: str, problem: Any) -> None:
     """Refuse a misspelt or missing name in the table of a problem."""
+    tables: list[tuple[str, Any, set[str], set[str]]]
     tables = [(f"{file}, {slug}", problem, {"mistakes"}, NAMES)]
-    for i, mistake in enumerate(problem.get("mistakes", []), start=1):
+    mistakes = problem.get("mistakes", []) if isinstance(problem, dict) else []
+    for i, mistake in enumerate(mistakes, start=1):
         tables.append((f"{file}, {slug}, mistake {i}", mistake, {"hint", "code"}, set()))
     for place, table, needed, more in tables:
+        if not isinstance(table, dict):
+            raise ValueError(f"{place}: a table is wanted, got {table!r:.60}")
         if unknown := table.keys() - needed - more:
             known = ", ".join(sorted(needed | more))
             raise ValueError(f"{place}: {min(unknown)} is not one of {known}")

@@ -265,6 +265,8 @@ def test_missing_or_broken_tables_and_data_are_reported(tmp_path, monkeypatch):
         ("[turn]\ninputs = 1", r"^ps2\.toml, turn: mistakes is missing"),
         ("[turn]\nmistakes = []\ninput = 1", r"^ps2\.toml, turn: input is not one of accuracy"),
         ("[turn]\nmistakes = [{hint = '', cod = ''}]", r"turn, mistake 1: cod is not one of code"),
+        ("[turn]\nmistakes = ['a']", r"turn, mistake 1: a table is wanted, got 'a'"),
+        ("helper = 'a'", r"^ps2\.toml, helper: a table is wanted, got 'a'"),
         ("[turn]\nmistakes = []\ninputs = 1", r"^ps2\.toml, turn: TypeError"),
     ):
         (tmp_path / "ps2.toml").write_text(text, "utf-8")

@@ -514,6 +514,7 @@ BROKEN += [b'{"cells": [{"source": [3]}]}', b'{"nbformat": 4', b"\x00" * 100, b"
     ("content", "said"),
     [(b" ", "empty"), (b"%PDF-1.7", "a PDF or an archive"), (b"PK\x03", "a PDF or an archive")]
     + [(b'{\n "cells": [\n', "damaged or not a notebook .it stops being JSON in line 3")]
+    + [(b'{"cells": []}', r"damaged or not a notebook \(it has no cells\);")]
     + [(content, "damaged or not a notebook") for content in BROKEN],
 )
 def test_files_without_a_notebook_are_refused(content, said):
