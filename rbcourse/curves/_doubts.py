@@ -166,7 +166,6 @@ def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
         return False
     share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
     bend = (t[1:-1] - t[:-2]) * (t[2:] - t[1:-1])  # an acceleration's distance is bend/2 times it
-    longer = np.maximum(bend / _usual_near(bend), 1)
     before, R, after = poses[:-2, :3, :3], poses[1:-1, :3, :3], poses[2:, :3, :3]
     between = before @ exp_so3(share * log(before.mT @ after))
     distances = {"turn": (angle_between(between, R), angle_between(before, R))}
@@ -177,6 +176,9 @@ def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
     found = False
     for part, (off, step) in distances.items():
         usual = np.maximum(_usual_near(off), ROUNDING * (1 + np.abs(poses).max()))
+        if not (off > OFF_LINE * usual).any():
+            continue
+        longer = np.maximum(bend / _usual_near(bend), 1)
         ratio = np.where(off > _usual_near(step), off / (longer * usual), 0)
         i = np.argmax(ratio)
         if ratio[i] > OFF_LINE:
