@@ -20,6 +20,7 @@ acceleration                                 legs turn by more than 90°; joined
 join them with given velocities              chain
 pass near noisy poses                        smoothing_spline, or with the least cost
                                              optimum.minimum_acceleration_smoothing
+find wrong poses in a recording              outliers.wrong_poses
 pass through them with the least cost        minimum_acceleration_spline (for any body); for
                                              rotations, minimum_torque_spline, minimum_jerk_spline
 evaluate a curve c                           c(t), c(t, 1), c(t, 2); c.state(t) for all three
@@ -35,7 +36,8 @@ draw the figures of BK and RR                paper.figure_1, ..., report.figure_
                                              terminal: python -m rbcourse all
 
 The modules closed_forms, quaternion, metrics, connection, planar, arm, sampling, straight_line,
-optimum, files, textbook (short versions of the main algorithms), paper, report and draw have more.
+optimum, outliers, files, textbook (short versions of the main algorithms), paper, report and draw
+have more.
 
 Conventions: angles are in rad, and lengths in m. Velocities are in the body frame, per unit of
 time: angular velocities ω, shape (3,), of rotations, and twists (ω, v), shape (6,), of poses. The
@@ -200,6 +202,7 @@ if TYPE_CHECKING:
     from rbcourse import files as files
     from rbcourse import metrics as metrics
     from rbcourse import optimum as optimum
+    from rbcourse import outliers as outliers
     from rbcourse import paper as paper
     from rbcourse import planar as planar
     from rbcourse import projection as projection
@@ -217,6 +220,7 @@ else:
         "files",
         "metrics",
         "optimum",
+        "outliers",
         "paper",
         "planar",
         "projection",

@@ -100,7 +100,7 @@ _FEW = 0.05  # of the rows may be left out
 _SET_BACK = "the clock was set back, or the rows are in another order; split the file"
 _MISSING = {"", "nan", "-nan", "nat", "na", "n/a", "#n/a", "null", "none", "inf", "+inf", "-inf"}
 _MISSING |= {"-nan(ind)", "1.#qnan"}
-_LOG = logging.getLogger("rbcourse.files")
+LOG = logging.getLogger("rbcourse.files")
 
 
 class Recording(NamedTuple):
@@ -203,7 +203,7 @@ def read_recording(
     for kind, which in {"nan": dropped, **more}.items():
         if which:
             some = ", ".join(str(rows.lines[i]) for i in which[:8]) + ", …" * (len(which) > 8)
-            _LOG.warning("%s: left out %s rows (%d), in line %s", file, kind, len(which), some)
+            LOG.warning("%s: left out %s rows (%d), in line %s", file, kind, len(which), some)
     columns_kept = {name: column[[*ordered]] for name, column in found.items()}
     return Recording(file, [rows.lines[i] for i in ordered], [*ordered.values()], columns_kept)
 
@@ -226,7 +226,8 @@ def _increasing(
             if kind == "unordered" and lost > max(10, _FEW * len(stamps)):
                 cure = _SET_BACK
                 wrong, *earlier = [*ordered][:-3:-1]
-                if earlier and ordered[earlier[0]] < stamp:
+                before = ordered[earlier[0]] if earlier else Decimal("-inf")
+                if before < stamp < stamps[number + 1]:
                     cure = f"the time in line {rows.lines[wrong]} may be wrong; delete this line"
             if constant:
                 cure = "all times are equal, so they are not the times of the poses"
@@ -438,7 +439,7 @@ def _meaning(name: str) -> tuple[str | None, str | None]:
     if name in VELOCITIES:
         return VELOCITIES[name], None
     bracket = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
-    words = re.findall(r"[^\W_]+", (bracket[1] if bracket else name).lower())
+    words = _words(bracket[1] if bracket else name)
     unit = bracket[2].strip().lower() if bracket else ""
     if re.fullmatch(_MEANINGS["nanoseconds"], "_".join(words)):
         return "nanoseconds", None
@@ -524,7 +525,7 @@ def _named(rows: _Rows, form: str | None, unit: str | None) -> tuple[Columns, st
             f"are {', '.join(rows.names)[:300]!r}"
         )
     if "x" not in found and others:
-        _LOG.warning("%s: rotations without positions; not read: %s", rows.file, ", ".join(others))
+        LOG.warning("%s: rotations without positions; not read: %s", rows.file, ", ".join(others))
     lengths = {units[name] or "m" for name in POSITION if name in found} or {"m"}
     if len(lengths) > 1 or not lengths <= LENGTHS.keys():
         raise ValueError(f"{rows.file}: positions in m, cm or mm are wanted, got {lengths}")

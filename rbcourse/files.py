@@ -19,6 +19,7 @@ from rbcourse._recordings import (
     DIGITS,
     EXACT,
     FORMATS,
+    LOG,
     MATRIX,
     POSITION,
     QUATERNION,
@@ -63,6 +64,8 @@ PLANAR = {
 """The columns of a planar plan before the duration, for each frame."""
 DURATION = "duration [s]"
 _TOLERANCE = 1e-3  # of quaternion norms and of RᵀR; some programs write only four decimals
+_FAST = 100.0  # m/s
+_ROUNDED = 0.01  # of norms of quaternions with two decimals
 
 
 def write_path(
@@ -244,7 +247,10 @@ def read_path(
     R = _rotations(recording)
     poses = join(R, _stacked(columns, POSITION)) if "x" in columns else R
     rates = [name for name in VELOCITIES.values() if name in columns]
-    return _relative(recording, start), poses, _stacked(columns, rates) if rates else None
+    seconds = _relative(recording, start)
+    if "x" in columns:
+        _tell_speed(file, seconds, poses[:, :3, 3])
+    return seconds, poses, _stacked(columns, rates) if rates else None
 
 
 def save_plan(file: File, plan: Plan, kind: str) -> None:
@@ -361,9 +367,12 @@ def _rotations(recording: Recording) -> Array:
         norm = np.linalg.norm(q, axis=1)
     if (wrong := np.abs(norm - 1) > _TOLERANCE).any():
         i = np.argmax(wrong)
+        hint = "format= may name the columns, if these are not the quaternion"
+        if np.abs(norm - 1).max() < _ROUNDED:
+            hint = "write more decimals"
         raise ValueError(
             f"{recording.place(i)}: a quaternion of norm 1 is wanted, got one of {norm[i]:.6g}; "
-            "format= may name the columns, if these are not the quaternion"
+            f"{hint}"
         )
     return matrix_from_quaternion(project_quaternion(q))
 
@@ -390,6 +399,19 @@ def _relative(recording: Recording, start: Any) -> Array:
             "same double; start='first' returns times after the first one"
         )
     return times
+
+
+def _tell_speed(file: File, times: Array, positions: Array) -> None:
+    """Log a speed that is so high that the positions may be in mm."""
+    speeds = np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(times)
+    speed = np.median(speeds) if len(speeds) else 0.0
+    if speed > _FAST:
+        LOG.warning(
+            "%s: the median speed is %.3g m/s; if the positions are in mm, the names of their "
+            "columns, or format=, must have [mm]",
+            file,
+            speed,
+        )
 
 
 def _stacked(columns: dict[str, Array], names: Sequence[str]) -> Array:

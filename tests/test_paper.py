@@ -102,7 +102,7 @@ def test_the_command_draws_figures_into_files(tmp_path, capsys):
     assert "The optimal rotation costs" in " ".join(text.split())
     written = (tmp_path / "my own" / "paper_fig4c.csv").read_text("utf-8")
     assert written == csv_text(paper.figure_4(w1=[0.5, -1, 7]).data)
-    run(COMMAND, ["RR6", "--goal", "4", "2", "1", "--folder", str(tmp_path)])
+    run(COMMAND, ["rr6", "--goal", "4", "2", "1", "--folder", str(tmp_path)])
     assert (tmp_path / "report_fig6.pdf").exists()
     for words, message in {
         "6 --folder x": "FIGURE: one of BK1, BK2a, .*RR9 or all is wanted, got 6",

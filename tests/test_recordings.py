@@ -99,6 +99,11 @@ GOOD = {
         {},
         [1583836591.5],
     ),
+    "camel_case.csv": (
+        f"timeMs,posX,posY,posZ,rotW,rotX,rotY,rotZ,accX\n1500,{ROWS},9.8\n",
+        {},
+        [1.5],
+    ),
     "airsim_rec.txt": (
         "VehicleName\tTimeStamp\tPOS_X\tPOS_Y\tPOS_Z\tQ_W\tQ_X\tQ_Y\tQ_Z\tImageFile\n"
         + f"Drone\t1583836591182\t{ROWS}".replace(",", "\t")
@@ -440,9 +445,33 @@ def test_rows_are_not_left_out_if_the_clock_is_wrong(tmp_path):
     reverse = "".join(f"{4 - i / 100} {ROW}\n" for i in range(400))
     with pytest.raises(ValueError, match=r"line 2: .* or the rows are in another order"):
         rb.read_path(written(tmp_path, "e.txt", reverse))
+    first = "".join(f"{i / 100 + 99 * (i == 0)} {ROW}\n" for i in range(400))
+    with pytest.raises(ValueError, match=r"line 2: .* the time in line 1 may be wrong; delete"):
+        rb.read_path(written(tmp_path, "f.txt", first))
     back = "".join(f"{i / 100 - 0.5 * (i > 200)} {ROW}\n" for i in range(400))
     with pytest.raises(ValueError, match=r"line 202: the clock was set back"):
         rb.read_path(written(tmp_path, "b.txt", back), skip=("unordered", "repeated"))
+
+
+def test_positions_that_may_be_in_mm_are_told(tmp_path, caplog):
+    text = "t,x,y,z,qw,qx,qy,qz\n" + "".join(f"{i / 100},{5 * i},0,0,1,0,0,0\n" for i in range(9))
+    rb.read_path(written(tmp_path, "mm.csv", text))
+    assert caplog.messages[0].endswith(
+        "the median speed is 500 m/s; if the positions are in mm, the names of their columns, or "
+        "format=, must have [mm]"
+    )
+    caplog.clear()
+    _, poses, _ = rb.read_path(
+        written(tmp_path, "m.csv", text.replace("t,x,y,z", "t,x [mm],y [mm],z [mm]"))
+    )
+    assert poses[1, 0, 3] == 0.005
+    assert not caplog.messages
+
+
+def test_quaternions_with_too_few_decimals_are_told(tmp_path):
+    file = written(tmp_path, "few.txt", "0 0 0 0 0.26 0 0 0.97\n1 0 0 0 0 0 0 1.00\n")
+    with pytest.raises(ValueError, match=r"line 1: .* got one of 1.00424; write more decimals"):
+        rb.read_path(file)
 
 
 def test_bad_arguments_are_named(tmp_path):

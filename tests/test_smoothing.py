@@ -1,8 +1,6 @@
 """Test smooth curves near noisy rotations and poses by their definitions and by SciPy."""
 
-import re
 import warnings
-from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -190,43 +188,30 @@ def test_a_short_period_interpolates_and_a_long_one_gives_a_steady_turn():
     assert np.abs(c(T) - steady).max() < 1e-3
 
 
-def found_by_the_loop(times, poses):
-    loop = re.search(r"misses some::\n\n(.*?)\n\n", rb.smoothing_spline.__doc__, re.DOTALL)[1]
-    names = {"np": np, "times": times, "poses": poses} | vars(rb)
-    with warnings.catch_warnings(action="ignore"):
-        exec(dedent(loop), names)
-    return names["good"]
-
-
 @pytest.mark.parametrize("decimals", [3, 6])
-def test_the_loop_finds_wrong_poses_of_rounded_recordings_with_long_rests(decimals):
+def test_wrong_poses_are_found_in_rounded_recordings_with_long_rests(decimals):
     """Where a recording rests, rounded poses have no errors."""
     t = np.linspace(0, 15, 1001)
-    x = np.sin(np.clip(t, 2, 5))[:, None] * [
-        0.5,
-        0.3,
-        1,
-        1,
-        2,
-        0.5,
-    ]  # moves for a fifth of the time
+    moving = np.sin(np.clip(t, 2, 5))  # for a fifth of the time
+    x = moving[:, None] * [0.5, 0.3, 1, 1, 2, 0.5]
     poses = rb.pose_from_coordinates(x.round(decimals))
     poses[[200, 600, 700], :3, 3] += 0.05
-    wrong = np.flatnonzero(~found_by_the_loop(t, poses))
+    wrong = np.flatnonzero(rb.outliers.wrong_poses(t, poses))
     assert {200, 600, 700} <= {*wrong.tolist()}
     assert len(wrong) < 100  # where the motion begins and ends, its acceleration jumps
 
 
 @pytest.mark.parametrize("still", [np.s_[:3], np.s_[3:]], ids=["turns", "moves"])
-def test_the_loop_works_for_bodies_that_only_turn_or_only_move(still):
+def test_wrong_poses_of_bodies_that_only_turn_or_only_move_are_found(still):
     rng, t = np.random.default_rng(9), np.linspace(0, 6, 600)
     x = np.sin(t)[:, None] * [0.5, 0.2, 0.1, 0.3, 0.4, 0] + 1e-4 * rng.normal(size=(600, 6))
     x[200] += 0.1
     x[:, still] = 0
-    assert np.flatnonzero(~found_by_the_loop(t, rb.pose_from_coordinates(x))).tolist() == [200]
+    found = rb.outliers.wrong_poses(t, rb.pose_from_coordinates(x))
+    assert np.flatnonzero(found).tolist() == [200]
 
 
-def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
+def test_wrong_poses_are_found_between_noisy_ones():
     """The first poses accelerate, where natural ends do not follow them."""
     rng, t = np.random.default_rng(7), np.linspace(0, 10, 301)
     vectors = np.stack([np.sin(t), 0.5 * t, np.cos(1.3 * t)], axis=-1)
@@ -236,8 +221,10 @@ def test_wrong_poses_are_found_by_the_loop_of_the_docstring():
     poses[:, :3, 3] += 0.002 * rng.normal(size=(301, 3))
     poses[[20, 120, 121, 240], :3, :3] = Rotation.random(4, rng).as_matrix()
     poses[[70, 200], :3, 3] += 0.1
-    good = found_by_the_loop(t, poses)
+    good = ~rb.outliers.wrong_poses(t, poses)
     assert np.flatnonzero(~good).tolist() == [20, 70, 120, 121, 200, 240]
+    turned = rb.outliers.wrong_poses(t, poses[::-1, :3, :3], period=0.4)[::-1]
+    assert np.flatnonzero(turned).tolist() == [20, 120, 121, 240]
     c = rb.smoothing_spline(t[good], poses[good])
     assert c.noise == pytest.approx([0.004, 0.002], rel=0.1)
     assert np.sqrt(np.mean(rb.angle_between(c(t)[:, :3, :3], true[:, :3, :3]) ** 2)) < 0.004
@@ -257,7 +244,8 @@ def test_wrong_poses_are_announced(smooth, part, count):
     shift[0 if part == "turn" else 4] = 0.1
     wrong = good.copy()
     wrong[60 : 60 + count] @= rb.exp_se3(shift)
-    message = rf"^poses\[(59|6[0-3])\] or a pose near it may be wrong: its {part} is .* times"
+    how = rf"or a pose near it may be wrong: its {part} is" if count == 1 else f": the {part} jumps"
+    message = rf"^poses\[(59|6[0-3])\] ?{how} .* times .* rbcourse.outliers.wrong_poses finds"
     with pytest.warns(RuntimeWarning, match=message) as told:
         smooth(t, wrong)
     assert told[0].filename == __file__
@@ -270,10 +258,22 @@ def test_a_lasting_turn_by_relabelled_markers_is_announced():
     rng, t = np.random.default_rng(3), np.linspace(0, 10, 1000)
     poses = rb.exp_se3(t[:, None] * [0, 0.3, 1, 0.2, 0, 0] + 0.001 * rng.normal(size=(1000, 6)))
     poses[600:, :3, :3] @= rb.exp_so3([np.pi, 0, 0])
-    message = r"^poses\[(599|600)\] or a pose near it may be wrong: its turn .* its neighbours as"
+    message = r"^poses\[(599|600)\]: the turn jumps near it, .*; if the poses before .* apart;"
     for period in (None, 0.5):
         with pytest.warns(RuntimeWarning, match=message):
             rb.smoothing_spline(t, poses, period=period)
+
+
+def test_a_turn_too_fast_for_the_search_of_wrong_poses_is_announced():
+    t = np.arange(100.0)
+    turning = rb.exp_so3(
+        t[:, None] * [0, 0, 1] + 0.01 * np.random.default_rng(2).normal(size=(100, 3))
+    )
+    with pytest.warns(RuntimeWarning, match=r"^period: the body turns by 1.* rad .* shorter one"):
+        rb.outliers.wrong_poses(t, turning)
+    assert not rb.outliers.wrong_poses(t, turning, period=3).any()
+    with pytest.raises(ValueError, match=r"^period"):
+        rb.outliers.wrong_poses(t, turning, period=0)
 
 
 @pytest.mark.parametrize("step", [0.005, 0.1])
@@ -568,3 +568,29 @@ def test_a_period_in_another_unit_than_the_times_is_refused():
         ValueError, match=r"^period: a thousandth of the mean step 1.01e\+05 or more"
     ):
         rb.smoothing_spline(t, rb.exp_so3(t[:, None] * [0, 0, 1e-7]), period=0.5)
+
+
+@pytest.mark.parametrize(("rate", "noise"), [(30, 0), (30, 1e-5), (200, 0), (200, 1e-3)])
+def test_few_right_poses_are_found_to_be_wrong(rate, noise):
+    """Without noise, the curve is farther from poses where the motion accelerates."""
+    rng, t = np.random.default_rng(1), np.arange(0, 10, 1 / rate)
+    x = np.sin(t[:, None] + np.arange(6)) * [0.5, 0.8, 0.3, 0.3, 0.4, 0.2]
+    poses = rb.pose_from_coordinates(x + noise * rng.normal(size=x.shape))
+    wrong = np.sort(rng.choice(len(t), 8, replace=False))
+    poses[wrong, :3, 3] += [0, 0.05, 0]
+    found = rb.outliers.wrong_poses(t, poses)
+    assert found[wrong].all()
+    assert found.sum() <= 8 + 6
+    inside = np.arange(20, len(t) - 20)
+    assert {*inside[found[20:-20]].tolist()} <= {*wrong.tolist()}
+
+
+@pytest.mark.parametrize("size", [0.02, 0.1, 1])
+def test_three_wrong_poses_in_a_row_are_found(size):
+    rng, t = np.random.default_rng(1), np.arange(0, 10, 0.02)
+    x = np.sin(t[:, None] + np.arange(6)) * [0.5, 0.8, 0.3, 0.3, 0.4, 0.2]
+    poses = rb.pose_from_coordinates(x + 1e-3 * rng.normal(size=x.shape))
+    poses[100:103, :3, 3] += [size, 0, 0]
+    poses[300:303] @= rb.exp_se3([0, size, 0, 0, 0, 0])
+    found = np.flatnonzero(rb.outliers.wrong_poses(t, poses))
+    assert found.tolist() == [100, 101, 102, 300, 301, 302]

@@ -22,6 +22,7 @@ SHORTEST = 0.1  # steps: shorter periods have another unit than the times, or pa
 FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
 WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
 OFF_LINE = 5.0  # times the usual distance [noise alone: 3; three poses off by 50 times: 7]
+ALIKE = 0.75  # of the largest distance: next to a wrong pose, half; next to a jump, all of it
 NEAR = 10  # poses on each side; three quarters of them are within the usual distance
 MOST_SLOPE = 0.75  # of the mean slope [rest for 3 of 20 poses, then steady: 0.7]
 CLEAR = 5.0  # standard errors of the slope at an end [bodies at rest: 2.5]
@@ -63,8 +64,17 @@ def _warn(what: str, depth: int = 0) -> None:
 
 
 def _warn_of_pose(i: int | np.intp, why: str) -> None:
-    cure = "the loop in help(rbcourse.smoothing_spline) finds wrong poses"
+    cure = "rbcourse.outliers.wrong_poses finds wrong poses"
     _warn(f"poses[{i}] or a pose near it may be wrong: its {why}; {cure}", 1)
+
+
+def _warn_of_jump(i: int | np.intp, part: str, ratio: float) -> None:
+    _warn(
+        f"poses[{i}]: the {part} jumps near it, {ratio:.0f} times as far as usual; if the poses "
+        "before and after the jump are right, smooth them apart; otherwise "
+        "rbcourse.outliers.wrong_poses finds those that are wrong",
+        1,
+    )
 
 
 def _check_gaps(smoother: Smoother, periods: Any) -> None:
@@ -180,11 +190,18 @@ def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
             continue
         longer = np.maximum(bend / _usual_near(bend), 1)
         ratio = np.where(off > _usual_near(step), off / (longer * usual), 0)
-        i = np.argmax(ratio)
-        if ratio[i] > OFF_LINE:
-            far = f"{part} is {ratio[i]:.0f} times as far from the line through its neighbours as"
+        i, largest = np.argmax(ratio), ratio.max()
+        if largest <= OFF_LINE:
+            continue
+        found = True
+        beside = np.pad(off, 1)
+        i += np.argmax(beside[i : i + 3]) - 1
+        before, here, after = beside[i : i + 3]
+        if max(before, after) > ALIKE * here:
+            _warn_of_jump(i + 1, part, largest)
+        else:
+            far = f"{part} is {largest:.0f} times as far from the line through its neighbours as"
             _warn_of_pose(i + 1, f"{far} usual")
-            found = True
     return found
 
 

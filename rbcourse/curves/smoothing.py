@@ -46,7 +46,7 @@ LEAST, STEP, MOST = -12.0, 1.5, 28.0  # of log λ, if the mean step and the mean
 TOGETHER = 1e-3  # of the usual step [one pair apart by 2e-5 changed the best period by 8 %]
 LEAST_PERIOD = 1e-3  # in mean steps; below, the degrees of freedom and the noise are lost
 _RATIO = 1e6  # of weights; with 1e12, a period of 1,000 steps gives a noise that is wrong by 30 %
-_DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
+DOMAIN = 1.0  # rad: the turn in the time period/2π up to which the excess is small [measured: 5 %]
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -133,21 +133,7 @@ def smoothing_spline(
     Moved rotations give the moved curve; reversed times reverse it. A pose of another point of the
     body is smoothed differently, since the origin is. Singular set: that of `quaternion_spline`.
 
-    A few wrong poses spoil the curve. This loop finds them, and then ``times[good]`` and
-    ``poses[good]`` are smoothed. For rotations, take ``turn`` alone. The period of ten steps is for
-    bodies that turn by less than 10° in a step; of more than ten wrong poses in a row, the loop
-    misses some::
-
-        w, ten = np.ones(len(times)), 10 * np.median(np.diff(times))
-        for _ in range(5):
-            S = smoothing_spline(times, poses, period=ten, weights=w)(times)
-            turn = angle_between(S[:, :3, :3], poses[:, :3, :3])
-            move = np.linalg.norm(S[:, :3, 3] - poses[:, :3, 3], axis=1)
-            # without poses at rest, whose errors may be 0, three quarters are nearer than 1
-            some = [x / np.quantile(x[x > 1e-9], 0.75) for x in (turn, move) if x.max() > 1e-9]
-            off = np.max(some, axis=0)
-            w = 1.2 / np.clip(off, 1.2, 1e5)
-        good = off < 4
+    A few wrong poses spoil the curve; `rbcourse.outliers.wrong_poses` finds them.
 
     Examples
     --------
@@ -159,21 +145,36 @@ def smoothing_spline(
     (array([0., 0., 2.]), 0.02)
     """
     A, smoother, noises, periods = checked_problem(times, poses, ends, noise, period, weights)
-    R = A[:, :3, :3]
-    c = closed_form(smoother, R, noises[0], periods[0])
-    turn = c.period / (2 * np.pi) * np.sqrt(np.mean(np.sum(c.velocities**2, axis=1)))
-    if turn > _DOMAIN:
+    c = smooth(smoother, A, noises, periods)
+    if (turn := turn_in_period(c)) > DOMAIN:
         warnings.warn(
-            f"the body turns by {turn:.3g} rad in the time period/2π, and beyond {_DOMAIN:g} rad "
+            f"the body turns by {turn:.3g} rad in the time period/2π, and beyond {DOMAIN:g} rad "
             "the closed form is not near the optimum; choose a shorter period, or "
             "rbcourse.optimum.minimum_acceleration_smoothing",
             RuntimeWarning,
             stacklevel=2,
         )
-    if A.shape[-1] == 4:
-        c = with_origins(c, RigidMotion, smoother, A[:, :3, 3], noises[1], periods[1])
     warn_of_doubts(smoother, c, A, noise, period, weights)
     return c
+
+
+def smooth(
+    smoother: Smoother,
+    A: Array,
+    noises: Sequence[float | None],
+    periods: Sequence[float | None],
+) -> SmoothedChain:
+    """Return the smooth curve near rotations or poses."""
+    c = closed_form(smoother, A[:, :3, :3], noises[0], periods[0])
+    if A.shape[-1] == 4:
+        c = with_origins(c, RigidMotion, smoother, A[:, :3, 3], noises[1], periods[1])
+    return c
+
+
+def turn_in_period(c: SmoothedChain) -> float:
+    """Return the turn of a curve in the time period/2π, in rad."""
+    speed = np.sqrt(np.mean(np.sum(c.velocities[:, :3] ** 2, axis=1)))
+    return float(np.ravel(c.period)[0] / (2 * np.pi) * speed)
 
 
 def checked_problem(
@@ -401,7 +402,7 @@ class Smoother:
                     f"period: a thousandth of the mean step {self.unit:.4g} or more is wanted, got "
                     f"{period:.4g}; times and period have the same unit"
                 )
-            smoothing = (period / (2 * np.pi * self.unit)) ** 4
+            smoothing = self.smoothing(period)
         else:
             logs = np.arange(LEAST, min(4 * np.log(len(self.knots)), MOST), STEP)
             best = logs[np.argmin([score(x) for x in logs])]
@@ -419,6 +420,10 @@ class Smoother:
         """Return a smoothing with its period, and with the noise that its misfit shows."""
         noise = np.sqrt(misfit / (3 * self.freedom(smoothing)))
         return Smoothing(smoothing, self.period(smoothing), float(noise))
+
+    def smoothing(self, period: float) -> float:
+        """Return the smoothing with a period."""
+        return float((period / (2 * np.pi * self.unit)) ** 4)
 
     def period(self, smoothing: float) -> float:
         """Return the period of which an oscillation keeps half of its amplitude."""

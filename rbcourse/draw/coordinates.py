@@ -88,7 +88,7 @@ def describe_coordinates(data: Table) -> str:
     """Return a description of the picture of `draw_comparison`."""
     best, near = (_coordinates(name, data) for name in _STYLES)
     apart = np.linalg.norm(best - near, axis=-1)
-    start, end = (", ".join(f"{x:.3g}" for x in best[k].round(14) + 0.0) for k in (0, -1))
+    start, end = (", ".join(f"{x:.3g}" for x in best[k].round(9) + 0.0) for k in (0, -1))
     said = (
         "Optimum and projection in exponential coordinates σ: their paths, marked at equal times "
         "(left), the coordinates over time and the differences (right). "

@@ -125,13 +125,13 @@ def run(figures: Mapping[str, Callable[..., Drawing]], words: Sequence[str] | No
     words = sys.argv[1:] if words is None else words
     spaced = [f" {word}" if _NEGATIVE.fullmatch(word) else word for word in words]
     given = vars(parser.parse_args(spaced))
-    asked, folder = given.pop("figures"), given.pop("folder")
+    asked, folder = [word.lower() for word in given.pop("figures")], given.pop("folder")
     values = {name: value for name, value in given.items() if value is not None}
     for word in asked:
-        if word != "all" and not any(name.startswith(word) for name in figures):
+        if word != "all" and not any(name.lower().startswith(word) for name in figures):
             parser.error(f"FIGURE: one of {', '.join(figures)} or all is wanted, got {word}")
     for name, draw in figures.items():
-        if not any(word == "all" or name.startswith(word) for word in asked):
+        if not any(word == "all" or name.lower().startswith(word) for word in asked):
             continue
         try:
             if other := values.keys() - options[name]:
