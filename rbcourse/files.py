@@ -13,24 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbcourse._checks import as_single
+from rbcourse._columns import DIGITS, FORMATS, LOG, MATRIX, POSITION, QUATERNION, VELOCITIES
 from rbcourse._docs import described_by
 from rbcourse._numerics import Array, blocks
-from rbcourse._recordings import (
-    DIGITS,
-    EXACT,
-    FORMATS,
-    LOG,
-    MATRIX,
-    POSITION,
-    QUATERNION,
-    VELOCITIES,
-    File,
-    Recording,
-    read_recording,
-    split_line,
-    text_lines,
-    to_number,
-)
+from rbcourse._recordings import EXACT, Recording, read_recording
+from rbcourse._tables import File, split_line, text_lines, to_number
 from rbcourse.curves.curve import Curve
 from rbcourse.planar import Commands, Plan, as_command, as_plan
 from rbcourse.projection import is_so, project_so
