@@ -35,7 +35,7 @@ from rbcourse.so3 import angle_between
 Leg = Callable[..., Curve]
 
 _WIDE = 120  # degrees; from rest to rest, a wider leg costs 2.6 times as much as the optimum
-_ARRIVED = 1e-6
+_ARRIVED = 1e-6  # a leg may miss its poses by this much, as rotation matrices may miss RᵀR = I
 _SMOOTH = 1e-9  # a velocity jumps if it changes at a knot by more than this share of the largest
 
 

@@ -45,7 +45,7 @@ PathEnds: TypeAlias = (
 
 _SHORTEST, _LONGEST = 1e-100, 1e100  # limits of a duration
 _CLOSE = 1e-5  # of the usual step; closer times are refused [at 1e-6, w' jumps by 1 %]
-_NEAR_HALF_TURN = 1e-6
+_NEAR_HALF_TURN = 1e-6  # rad; nearer, entries rounded to 1e-16 change the axis by over 1e-10
 _ENDS = "'natural', 'rest', 'periodic' or a pair of velocities"
 
 

@@ -37,7 +37,7 @@ from rbcourse.so3 import hat
 
 _PENALTY = 1e4  # the penalty is this number times (‖c‖ + 1) ‖M‖
 _CLEAR = 1e-6  # a smaller eigenvalue may differ from 0 only by rounding
-_DEGREES = 24, 48, 96
+_DEGREES = 24, 48, 96  # of test functions; the next, if the bounds of an eigenvalue are not clear
 _SMALL = 2 * np.pi**3  # for a ball, a smaller ‖c‖ suffices (docs/near_optimal.md)
 
 
