@@ -20,7 +20,10 @@ from rbcourse._tables import DATE, File, Rows, numbers, read_rows, text_lines, t
 EXACT = Context(prec=60)
 _FEW = 0.05  # of the rows may be left out
 _MOVED = 0.3  # of the rows may repeat a time with another pose
-_SET_BACK = "the clock was set back, or the rows are in another order; split the file"
+_SET_BACK = (
+    "the clock was set back, a time before is wrong, or the rows are in another order; split the "
+    "file, or delete the wrong row"
+)
 
 
 class Recording(NamedTuple):

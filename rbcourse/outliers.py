@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbcourse._numerics import Array
+from rbcourse.curves._doubts import distances
 from rbcourse.curves.smoothing import (
     DOMAIN,
     Smoother,
@@ -16,7 +17,6 @@ from rbcourse.curves.smoothing import (
     turn_in_period,
 )
 from rbcourse.curves.velocities import usual_step
-from rbcourse.so3 import angle_between
 
 __all__ = ["wrong_poses"]
 
@@ -26,6 +26,7 @@ FAR = 4.0  # usual distances; of noise alone, 8 standard deviations
 FULL_WEIGHT = 1.2  # usual distances: Huber's bound [2.4 standard deviations]
 LEAST_WEIGHT = 1e-5
 REST = 1e-9  # rad, m: smaller distances are those of a body that rests without noise
+MANY = 0.1  # of the poses
 FINE = 0.01  # of the usual step [without noise, half of the poses of a motion are farther]
 
 
@@ -62,7 +63,8 @@ def wrong_poses(
     -----
     RuntimeWarning
         If the body turns by more than 1 rad in the time period/2π, so right poses may be far from
-        the curve. With the default period, this is a turn by 36° in a step.
+        the curve (with the default period, this is a turn by 36° in a step); or if more than a
+        tenth of the poses are found.
 
     Examples
     --------
@@ -89,7 +91,15 @@ def wrong_poses(
             RuntimeWarning,
             stacklevel=2,
         )
-    return off > FAR
+    found = off > FAR
+    if found.mean() > MANY:
+        warnings.warn(
+            f"poses: {found.sum()} of {len(found)} are far from the curve, so the noise may vary; "
+            "if so, keep them, and give weights to smoothing_spline",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    return found
 
 
 def _relative_distances(near: Array, poses: Array) -> Array:
@@ -98,16 +108,8 @@ def _relative_distances(near: Array, poses: Array) -> Array:
     Poses at rest that have no noise do not count for the usual distance.
     """
     off = np.zeros(len(poses))
-    for x, move in zip(_distances(near, poses), _distances(poses[:-1], poses[1:]), strict=True):
+    for x, move in zip(distances(near, poses), distances(poses[:-1], poses[1:]), strict=True):
         if x.max() > REST:
             usual = max(np.quantile(x[x > REST], 0.75), FINE * usual_step(move))
             off = np.maximum(off, x / usual)
     return off
-
-
-def _distances(some: Array, others: Array) -> list[Array]:
-    """Return the angles between rotations and, of poses, the distances of the origins."""
-    distances = [angle_between(some[:, :3, :3], others[:, :3, :3])]
-    if some.shape[-1] == 4:
-        distances.append(np.linalg.norm(some[:, :3, 3] - others[:, :3, 3], axis=1))
-    return distances

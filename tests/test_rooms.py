@@ -117,7 +117,7 @@ def test_imports_follow_the_rules():
     assert list(faults(PACKAGES)) == []
 
 
-ON_CURVES = {f"rbcourse{x}" for x in ("", ".closed_forms", ".files", ".textbook")}
+ON_CURVES = {f"rbcourse{x}" for x in ("", ".closed_forms", ".files", ".outliers", ".textbook")}
 DRAWN = "rbcourse.draw", "rbcourse.report", "rbcourse.paper", "rbcourse.__main__"
 
 

@@ -4,9 +4,9 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicHermiteSpline, make_smoothing_spline
+from scipy.interpolate import CubicHermiteSpline, make_interp_spline, make_smoothing_spline
 from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 import rbcourse as rb
 from rbcourse.curves.smoothing import Smoother
@@ -266,9 +266,8 @@ def test_a_lasting_turn_by_relabelled_markers_is_announced():
 
 def test_a_turn_too_fast_for_the_search_of_wrong_poses_is_announced():
     t = np.arange(100.0)
-    turning = rb.exp_so3(
-        t[:, None] * [0, 0, 1] + 0.01 * np.random.default_rng(2).normal(size=(100, 3))
-    )
+    noise = 0.05 * np.random.default_rng(2).normal(size=(100, 3))
+    turning = rb.exp_so3(t[:, None] * [0, 0, 1]) @ rb.exp_so3(noise)
     with pytest.warns(RuntimeWarning, match=r"^period: the body turns by 1.* rad .* shorter one"):
         rb.outliers.wrong_poses(t, turning)
     assert not rb.outliers.wrong_poses(t, turning, period=3).any()
@@ -594,3 +593,54 @@ def test_three_wrong_poses_in_a_row_are_found(size):
     poses[300:303] @= rb.exp_se3([0, size, 0, 0, 0, 0])
     found = np.flatnonzero(rb.outliers.wrong_poses(t, poses))
     assert found.tolist() == [100, 101, 102, 300, 301, 302]
+
+
+@pytest.mark.parametrize("rate", [100, 200, 1000])
+@pytest.mark.parametrize("jitter", [0, 0.004])
+def test_interpolated_poses_are_announced(rate, jitter):
+    """Poses of 50 in a second are looked up at other times."""
+    rng, t = np.random.default_rng(4), np.arange(0, 10, 0.02)
+    t = t + rng.uniform(-jitter, jitter, len(t))
+    x = np.sin(t[:, None] + np.arange(6)) * [0.5, 0.8, 0.3, 0.3, 0.4, 0.2]
+    A = rb.pose_from_coordinates(x + 1e-3 * rng.normal(size=x.shape))
+    at = np.arange(t[1], t[-2], 1 / rate)
+    R = Slerp(t, Rotation.from_matrix(A[:, :3, :3]))(at).as_matrix()
+    looked_up = rb.pose_from_components(R, make_interp_spline(t, A[:, :3, 3], k=1)(at))
+    message = (
+        "nothing to smooth" if rate == 100 and jitter else r"^poses: .* if .* interpolated, smo"
+    )
+    with pytest.warns(RuntimeWarning, match=message) as told:
+        rb.smoothing_spline(at, looked_up)
+    assert not any("wrong" in str(each.message) for each in told)
+    with warnings.catch_warnings(action="error"):
+        rb.smoothing_spline(t, A)
+        rb.smoothing_spline(at, looked_up, period=0.3)
+
+
+@pytest.mark.parametrize("dependence", [0, 0.5, 0.9])
+def test_dependent_errors_of_a_slow_motion_are_announced(dependence):
+    rng, t = np.random.default_rng(4), np.arange(0, 10, 0.01)
+    errors = rng.normal(size=(len(t), 6))
+    for i in range(1, len(t)):
+        errors[i] = dependence * errors[i - 1] + np.sqrt(1 - dependence**2) * errors[i]
+    x = np.sin(t[:, None] + np.arange(6)) * [0.5, 0.8, 0.3, 0.3, 0.4, 0.2]
+    A = rb.pose_from_coordinates(x + 0.01 * errors)
+    with warnings.catch_warnings(action="error"):
+        rb.smoothing_spline(t, A, period=0.5)
+        if not dependence:
+            rb.smoothing_spline(t, A)
+            return
+    with pytest.warns(RuntimeWarning) as told:
+        rb.smoothing_spline(t, A)
+    for each, part in zip(told, ("turn", "origin"), strict=True):
+        assert f"poses: the {part} seems to oscillate" in str(each.message)
+
+
+def test_many_wrong_poses_may_be_those_of_a_varying_noise():
+    rng, t = np.random.default_rng(4), np.arange(0, 10, 0.01)
+    noise = np.where((t > 3) & (t < 5), 0.02, 0.001)[:, None] * rng.normal(size=(len(t), 6))
+    A = rb.pose_from_coordinates(np.sin(t[:, None] + np.arange(6)) * 0.3 + noise)
+    with pytest.warns(
+        RuntimeWarning, match=r"^poses: 1\d\d of 1000 .* noise may vary; if so, keep"
+    ):
+        rb.outliers.wrong_poses(t, A)

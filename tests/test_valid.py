@@ -64,7 +64,7 @@ def taken(function, size):
     arguments = ARGUMENTS | of_group
     names = [x.name for x in parameters.values() if x.default is x.empty or x.name in of_group]
     given = {name: arguments[name] for name in names if name in arguments}
-    if "smoothing" in function.__name__:  # ten or more poses
+    if "smoothing" in function.__name__ or function is rb.outliers.wrong_poses:  # ten or more poses
         poses = np.resize(given["poses"], (10, *given["poses"].shape[1:]))
         given = {"times": np.arange(len(poses)), "poses": poses}
     if function is rb.sampling.uniformity_tests:
@@ -98,7 +98,9 @@ def numbers(result):
         return np.concatenate([result(0.3, k).ravel() for k in range(3)])
     if isinstance(result, dict):
         return np.array([test.statistic for test in result.values()])
-    return np.concatenate([np.ravel(x) for x in result]) if isinstance(result, tuple) else result
+    if isinstance(result, tuple):
+        return np.concatenate([np.ravel(x) for x in result])
+    return np.where(result, 2.0, 1.0) if result.dtype == bool else result
 
 
 def wrong_values(value):

@@ -23,6 +23,11 @@ FEW = 10  # poses; with 4, cross validation took half of 60 motions for noise
 WRONG = 10.0  # times the median error [noise alone: 5; a pose off by 20 times the noise: 12]
 OFF_LINE = 5.0  # times the usual distance [noise alone: 3; three poses off by 50 times: 7]
 ALIKE = 0.75  # of the largest distance: next to a wrong pose, half; next to a jump, all of it
+BENT, KINK = 4.0, 10.0  # times the median distance [noise alone: 3.5; a wrong pose: next to it, 5]
+MANY_KINKS, MOST_KINKS = 10, 0.8  # of poses, and the share of those that are not next to others
+# Dependent noise: the period in steps is 4 to 5.8 [coefficients 0.5 to 0.9], and the step times
+# (period/6)^4.5 is below 3 times the noise [independent noise, oscillations of 26 steps: 3.1]
+LEAST_OF_SHORT, SHORT, SLOW, SMALL_TURN = 3.9, 6.0, 3.0, 0.1
 NEAR = 10  # poses on each side; three quarters of them are within the usual distance
 MOST_SLOPE = 0.75  # of the mean slope [rest for 3 of 20 poses, then steady: 0.7]
 CLEAR = 5.0  # standard errors of the slope at an end [bodies at rest: 2.5]
@@ -51,11 +56,17 @@ def warn_of_doubts(
         _check_rest(smoother, poses)
     if _check_held(smoother, poses):
         return
+    if interpolated := _interpolated(smoother, poses):
+        if period is None:
+            _warn(interpolated)
+        return
     if weights is None and _check_neighbours(smoother, poses):
         return
     if period is None:
         _check_noise(smoother, curve.period, noise)
         _check_poses(smoother, curve, poses)
+    if period is None and noise is None:
+        _check_dependent(smoother, curve, poses)
 
 
 def _warn(what: str, depth: int = 0) -> None:
@@ -164,27 +175,36 @@ def _check_rest(smoother: Smoother, poses: Array) -> None:
                 _warn(f"ends: the body {how} at the {name} pose, so it is not at rest there")
 
 
+def _interpolated(smoother: Smoother, poses: Array) -> str:
+    """Return a warning if the poses are on straight lines between some of them, or "".
+
+    The velocity jumps at one pose, or between two, and their distances are far larger than half of
+    the distances. Next to a wrong pose, three poses have such distances.
+    """
+    for part, (off, _) in _from_lines(smoother, poses).items():
+        usual = max(np.median(off), ROUNDING * (1 + np.abs(poses).max()))
+        bent = np.pad(off > BENT * usual, 1)
+        starts, stops = np.flatnonzero(bent[1:] != bent[:-1]).reshape(-1, 2).T
+        peaks = np.array([off[i:k].max() for i, k in zip(starts, stops, strict=True)])
+        kinks = peaks > KINK * usual
+        if kinks.sum() > MANY_KINKS and np.mean((stops - starts)[kinks] <= 2) > MOST_KINKS:
+            return (
+                f"poses: the velocity of the {part} jumps at {kinks.sum()} poses, such as "
+                f"poses[{starts[kinks][0] + 1}], and hardly changes between them; if the poses "
+                "are interpolated, smooth the original ones, or give period"
+            )
+    return ""
+
+
 def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
     """Warn if a pose is far from the line through the poses before and after it.
 
     It is far if its distance is five times the usual one near it, and larger than the usual step
-    there: where the velocity of a motion jumps, the distance is at most a step. There may be too
-    few poses, or several at a time; then nothing is checked.
+    there: where the velocity of a motion jumps, the distance is at most a step.
     """
-    t = smoother.knots
-    if len(poses) != len(t) or len(t) < 2 * NEAR:
-        return False
-    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
-    bend = (t[1:-1] - t[:-2]) * (t[2:] - t[1:-1])  # an acceleration's distance is bend/2 times it
-    before, R, after = poses[:-2, :3, :3], poses[1:-1, :3, :3], poses[2:, :3, :3]
-    between = before @ exp_so3(share * log(before.mT @ after))
-    distances = {"turn": (angle_between(between, R), angle_between(before, R))}
-    if poses.shape[-1] == 4:
-        first, x, last = (poses[part, :3, 3] for part in (np.s_[:-2], np.s_[1:-1], np.s_[2:]))
-        off = first + share * (last - first) - x
-        distances["origin"] = np.linalg.norm(off, axis=1), np.linalg.norm(x - first, axis=1)
-    found = False
-    for part, (off, step) in distances.items():
+    found, h = False, np.diff(smoother.knots)
+    bend = h[1:] * h[:-1]  # the distance of a motion with an acceleration is bend/2 times it
+    for part, (off, step) in _from_lines(smoother, poses).items():
         usual = np.maximum(_usual_near(off), ROUNDING * (1 + np.abs(poses).max()))
         if not (off > OFF_LINE * usual).any():
             continue
@@ -202,6 +222,25 @@ def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
         else:
             far = f"{part} is {largest:.0f} times as far from the line through its neighbours as"
             _warn_of_pose(i + 1, f"{far} usual")
+    return found
+
+
+def _from_lines(smoother: Smoother, poses: Array) -> dict[str, tuple[Array, Array]]:
+    """Return distances of poses from the line through their neighbours, and their last steps.
+
+    There may be too few poses, or several at a time; then nothing is returned.
+    """
+    t = smoother.knots
+    if len(poses) != len(t) or len(t) < 2 * NEAR:
+        return {}
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    before, R, after = poses[:-2, :3, :3], poses[1:-1, :3, :3], poses[2:, :3, :3]
+    between = before @ exp_so3(share * log(before.mT @ after))
+    found = {"turn": (angle_between(between, R), angle_between(before, R))}
+    if poses.shape[-1] == 4:
+        first, x, last = (poses[part, :3, 3] for part in (np.s_[:-2], np.s_[1:-1], np.s_[2:]))
+        off = first + share * (last - first) - x
+        found["origin"] = np.linalg.norm(off, axis=1), np.linalg.norm(x - first, axis=1)
     return found
 
 
@@ -249,3 +288,35 @@ def _check_poses(smoother: Smoother, curve: Any, poses: Array) -> None:
         if size[i] > WRONG * usual and not least:
             far = f"{part} is {size[i] / usual:.0f} times as far from the curve as usual"
             _warn_of_pose(i, far)
+
+
+def _check_dependent(smoother: Smoother, curve: Any, poses: Array) -> None:
+    """Warn if cross validation follows errors that are alike in neighbouring poses.
+
+    For independent errors of the size σ, a period of P steps is right for a motion that moves by
+    about σ (T/P)^4.5 T^-1.5 in a step, if T is the period of the motion in steps; so if the body
+    moves by little and P is short, T must be short, too.
+    """
+    if len(poses) < 10 * NEAR:
+        return
+    several = distances(poses[:-NEAR], poses[NEAR:])
+    noises, periods = np.atleast_1d(curve.noise), np.atleast_1d(curve.period) / smoother.unit
+    for part, move, noise, period in zip(
+        ("turn", "origin"), several, noises, periods, strict=False
+    ):
+        step = np.sqrt(np.mean(move**2)) / NEAR
+        slow = step * (period / SHORT) ** 4.5 < SLOW * noise
+        if slow and LEAST_OF_SHORT < period < SHORT and (part == "origin" or step < SMALL_TURN):
+            _warn(
+                f"poses: the {part} seems to oscillate within {period:.1f} steps, so errors of "
+                "neighbouring poses may be alike, as after a filter; if the body does not "
+                "oscillate, give period"
+            )
+
+
+def distances(some: Array, others: Array) -> list[Array]:
+    """Return the angles between rotations and, of poses, the distances of the origins."""
+    found = [angle_between(some[:, :3, :3], others[:, :3, :3])]
+    if some.shape[-1] == 4:
+        found.append(np.linalg.norm(some[:, :3, 3] - others[:, :3, 3], axis=1))
+    return found

@@ -119,8 +119,9 @@ def smoothing_spline(
         step; if many poses equal the one before while the body moves; if ends should be at rest,
         and the body moves there; if, without given weights, a pose is five times as far from the
         line through its neighbours as is usual near it; or if, without a given period, nothing is
-        smoothed, a pose is ten times as far from the curve as half of the poses are, or cross
-        validation has fewer than ten poses.
+        smoothed, a pose is ten times as far from the curve as half of the poses are, poses seem to
+        be interpolated, errors of neighbours seem to be alike, or cross validation has fewer than
+        ten poses.
 
     Notes
     -----
