@@ -74,9 +74,8 @@ def main():
         print("There is no task %r. Choose from: %s." % (task, ", ".join(TASKS)), file=sys.stderr)
         sys.exit(2)
     environment, commands, purpose = TASKS[task]
-    runpy.run_path(str(OPTIONS))["parse"](task, words, purpose)  # --help ends here
-    if task in ("grade", "handout"):
-        check_sets([word for word in words if not word.startswith("-")])
+    given, _ = runpy.run_path(str(OPTIONS))["parse"](task, words, purpose)  # --help ends here
+    check_names(given)
     if task in PATHS and Path.cwd() != ROOT:
         words = [from_here(word) for word in words]
     set_up(environment)
@@ -89,13 +88,20 @@ def main():
         run(*command.split(), *(words if command is commands[-1] else []))
 
 
-def check_sets(names):
-    """Exit if there is no problem set of one of these names, before packages are installed."""
+def check_names(given):
+    """Exit if there is no problem set or lesson of a name, before packages are installed."""
     places = (ROOT / "notebooks" / "assignments").glob("*/*/*.ipynb")
-    known = sorted({path.stem for path in places if path.parts[-3] in ("source", "private")})
-    for name in names:
-        if known and name not in known:
-            sys.exit("%s: one of %s is wanted" % (name, ", ".join(known)))
+    sets = sorted({path.stem for path in places if path.parts[-3] in ("source", "private")})
+    lessons = sorted(path.name[:2] for path in (ROOT / "notebooks").glob("[0-9][0-9]_*.ipynb"))
+    asked = [*getattr(given, "sets", []), getattr(given, "set", "")]
+    numbers = [*getattr(given, "lessons", []), getattr(given, "lesson", "")]
+    for known, names in (
+        (sets, asked),
+        (lessons, [number.zfill(2) for number in numbers if number]),
+    ):
+        for name in names:
+            if known and name and name not in known:
+                sys.exit("%s: one of %s is wanted" % (name, ", ".join(known)))
 
 
 def from_here(word):

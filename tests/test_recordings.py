@@ -268,6 +268,10 @@ REFUSED = {
     "twice.txt": (f"0 {ROW}\n0.1 {ROW}\n0.10 {ROW}\n", "line 3: .*skip='repeated'"),
     "back.txt": (f"0 {ROW}\n0.2 {ROW}\n0.1 {ROW}\n", "line 3: .*skip='unordered'"),
     "utf_16.csv": (f"{OWN}\n0,{ROWS}\n".encode("utf-16"), "line 1: the text is not in UTF-8"),
+    "two_rows.txt": (
+        "0 1.5 2.5 3.5 0 0 0.600 0.800\n1 1.5 2.5 3.5 0 0 0.600 0.800",
+        "line 2: the line has no line end",
+    ),
     "a_few_decimals.txt": (f"0 {ROW}\n" * 3 + f"1 {ROW}", "line 4: the line has no line end"),
     "empty.txt": ("", "no line with numbers"),
 }  # fmt: skip

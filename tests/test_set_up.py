@@ -160,14 +160,18 @@ def test_pip_installs_the_packages_if_uv_fails(done, monkeypatch):
     assert by_uv[-2:] == by_pip[-2:] == ["-r", "environment.txt"]
 
 
-@pytest.mark.parametrize("task", ["handout", "grade"])
-def test_an_unknown_problem_set_is_named_before_packages_are_installed(
-    task, done, tmp_path, monkeypatch
+@pytest.mark.parametrize(
+    ("task", "word", "known"),
+    [("handout", "ps9", "ps1"), ("grade", "ps9", "ps1"), ("figures", "99", "03")],
+)
+def test_an_unknown_set_or_lesson_is_named_before_packages_are_installed(
+    task, word, known, done, tmp_path, monkeypatch
 ):
     (tmp_path / "notebooks/assignments/source/ps1").mkdir(parents=True)
     (tmp_path / "notebooks/assignments/source/ps1/ps1.ipynb").touch()
-    monkeypatch.setattr(sys, "argv", ["course.py", task, "ps9"])
-    with pytest.raises(SystemExit, match=r"^ps9: one of ps1 is wanted$"):
+    (tmp_path / "notebooks/03_rotations.ipynb").touch()
+    monkeypatch.setattr(sys, "argv", ["course.py", task, word])
+    with pytest.raises(SystemExit, match=f"^{word}: one of {known} is wanted$"):
         course.main()
     assert done == []
 

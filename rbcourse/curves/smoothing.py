@@ -292,7 +292,8 @@ def _as_pair(
             + ("a pair, for the rotation and the origin, is" if parts > 1 else "one is")
             + f" wanted, got {value!r}"
         )
-    check_all(values > 0, name, values, "a number above 0")
+    given = values.reshape(np.shape(value))
+    check_all(given > 0, name, given, "a number above 0")
     return [float(x) for x in np.broadcast_to(values, parts)]
 
 

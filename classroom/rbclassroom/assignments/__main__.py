@@ -31,6 +31,9 @@ def main() -> None:
             grade(known.sets, assignments, known.without_box)
         elif task == "collect":
             rows = collect(known.folder, assignments, known.due)
+            # files of students without a usable file are in their row, and not listed again
+            useless = "; ".join(why for kind, _, why in rows if kind == "nothing usable")
+            rows = [row for row in rows if f"{row[1]}: " not in useless]
             for kind in LISTS:
                 own = [(what, why) for name, what, why in rows if name == kind]
                 dated = kind == "late" and known.due
@@ -40,9 +43,7 @@ def main() -> None:
                 for reason in dict.fromkeys(why for _, why in own):
                     same = (what for what, why in own if why == reason)
                     print(f"  {'; '.join(same)}: {reason}")
-            # files of students without a usable file are not counted again
-            listed = "; ".join(why for kind, _, why in rows if kind == "nothing usable")
-            counts = Counter(kind for kind, what, _ in rows if f"{what}: " not in listed)
+            counts = Counter(kind for kind, _, _ in rows)
             counts["perhaps late"] = sum(why.startswith("perhaps") for _, _, why in rows)
             if wanted := ", ".join(f"{counts[kind]} {kind}" for kind in TO_DO if counts[kind]):
                 print(f"Look at these: {wanted}. All rows are in submitted/report.csv.")

@@ -36,7 +36,7 @@ from rbclassroom.assignments.submissions import Refused, read_notebook
 from rbclassroom.assignments.tables import update
 from rbcourse.files import replace_file
 
-WORKERS = 2  # number of students graded at the same time
+WORKERS = max(2, (os.cpu_count() or 2) // 2)  # number of students graded at the same time
 MEMORY = 1_500_000_000  # bytes, for each process
 LARGEST = 30_000_000  # bytes of a notebook
 Job = tuple[str, str]  # the name of a set, and the name of a student
@@ -76,11 +76,11 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
     return tables
 
 
-def _print_row(row: Row) -> None:
+def _print_row(row: Row, progress: str) -> None:
     said = [f"{row['total']} of {row['maximum']} points"] if "total" in row else []
     said += [f"still to grade by hand: {row['by hand']}"] if row.get("by hand") else []
     said += [row["remarks"]] if row["remarks"] else []
-    print(f"{row['set']}, {row['student']}: {'; '.join(said)}", flush=True)
+    print(f"{progress} {row['set']}, {row['student']}: {'; '.join(said)}", flush=True)
 
 
 def _write_table(name: str, graded: list[Row], assignments: Path) -> Path:
@@ -212,7 +212,8 @@ def _grade_set(jobs: list[Job], assignments: Path, rows: dict[Job, Row], boxed: 
                         where = f"The earlier points are in gradebook.before-{name}.db."
                         raise ValueError(f"The points of {others[0]} changed {when}. {where}")
                     rows[job] = row
-                    _print_row(row)
+                    done = len(jobs) - len(todo) - len(works)
+                    _print_row(row, f"{done}/{len(jobs)}")
         except KeyboardInterrupt:
             with _without_ctrl_c():
                 for process in active_children():

@@ -213,7 +213,7 @@ class Drawing(Problem):
         axes = self._draw(function, self.inputs[0])
         for name, label in (("x", axes.get_xlabel()), ("y", axes.get_ylabel())):
             if not label.strip():
-                needs = f"The {name} axis needs a label with the quantity and its unit."
+                needs = f"The {name} axis needs a label: the quantity and its unit."
                 raise NotYet(f"The curves are right. {needs}")
 
     def same(self, got: Any, wanted: Any) -> bool:
