@@ -58,7 +58,7 @@ def warn_of_doubts(
         return
     if interpolated := _interpolated(smoother, poses):
         if period is None:
-            _warn(interpolated)
+            _warn(interpolated, -1)
         return
     if weights is None and _check_neighbours(smoother, poses):
         return
@@ -70,7 +70,7 @@ def warn_of_doubts(
 
 
 def _warn(what: str, depth: int = 0) -> None:
-    """Warn; the place is the call of `smoothing_spline`, `depth` calls above a check."""
+    """Warn; the place is the call of `smoothing_spline`; `depth` counts calls within a check."""
     warnings.warn(what, RuntimeWarning, stacklevel=5 + depth)
 
 
