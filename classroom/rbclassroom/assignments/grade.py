@@ -6,11 +6,12 @@ import logging
 import os
 import re
 import signal
+import sqlite3
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process
 from pathlib import Path
@@ -62,18 +63,35 @@ def grade(names: Iterable[str], assignments: Path, without_box: bool = False) ->
             how = "--without-box runs them with all your rights"
             raise ValueError(f"No submission was run, because there is no sandbox: {why}; {how}.")
         print(f"Submissions run without a sandbox and with all your rights: {why}.", flush=True)
-    jobs = [job for name in dict.fromkeys(chosen) for job in _prepare(name, assignments)]
+    with _alone(assignments):
+        return _grade_sets([*dict.fromkeys(chosen)], assignments, boxed=not why)
+
+
+def _grade_sets(names: list[str], assignments: Path, boxed: bool) -> list[Path]:
+    """Grade all submissions of some sets; return their tables."""
+    jobs = [job for name in names for job in _prepare(name, assignments)]
     tables, rows = list[Path](), dict[Job, Row]()
     try:
-        for name in dict.fromkeys(chosen):
+        for name in names:
             own = [job for job in jobs if job[0] == name]
-            _grade_set(own, assignments, rows, boxed=not why)
+            _grade_set(own, assignments, rows, boxed)
             tables.append(_write_table(name, [rows[job] for job in own], assignments))
     except KeyboardInterrupt:
         count = f"{len(rows)} of {len(jobs)} submissions are graded"
         print(f"Stopped: {count}. Run this again to continue; then the tables are written.")
         raise SystemExit(130) from None
     return tables
+
+
+@contextmanager
+def _alone(assignments: Path) -> Iterator[None]:
+    """Refuse a second run at the same time; the lock of SQLite ends with this process."""
+    with closing(sqlite3.connect(assignments / ".grading", timeout=0)) as lock:
+        try:
+            lock.execute("BEGIN EXCLUSIVE")
+        except sqlite3.OperationalError as error:
+            raise ValueError(f"{assignments}: another grade is running ({error})") from error
+        yield
 
 
 def _print_row(row: Row, progress: str) -> None:

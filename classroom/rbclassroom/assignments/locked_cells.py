@@ -49,4 +49,4 @@ def blame(answer: str, wrong: list[str]) -> str:
     """Return a hint if a wrong answer calls a wrong function; add its own functions to `wrong`."""
     called = [name for name in wrong if re.search(rf"\b{name}\(", answer)]
     wrong += re.findall(r"^def (\w+)", answer, re.MULTILINE)
-    return f"It calls {called[0]}: correct that first." if called else ""
+    return f"It calls {called[0]}, which is not right yet." if called else ""

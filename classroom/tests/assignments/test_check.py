@@ -188,7 +188,7 @@ def test_a_failure_names_the_failed_answer_that_it_calls(release, capsys):
         cell(notebook, name).outputs = [new_output("error", ename="AssertionError", evalue="")]
     assert check._print_problems(notebook, original) == [False, False]
     said = capsys.readouterr().out
-    assert said.count("(It calls square: correct that first.)") == 1
+    assert said.count("(It calls square, which is not right yet.)") == 1
 
 
 @pytest.mark.parametrize("content", [b"", b"%PDF-1.7", b"no json"])

@@ -180,7 +180,7 @@ def test_a_page_of_feedback_begins_with_the_right_answers(course):
     assert "Right A tiny set: 1 of 1 Look at these again A tiny set: 0 of 2 AssertionError" in said
     said = " ".join(course.feedback("half right").split("Your notebook")[0].split())
     assert "Right" not in said
-    assert re.search("A tiny set: 0 of 1 MemoryError.{,20} It calls square: correct that", said)
+    assert re.search("A tiny set: 0 of 1 MemoryError.{,20} It calls square, which is not", said)
     assert "Your file cell 5, answer of “A tiny set”: takes too much memory" in said
 
 
@@ -356,6 +356,15 @@ def test_unknown_sets_are_refused(tmp_path):
         grade(["ps7"], tmp_path, without_box=True)
     with pytest.raises(ValueError, match="There are no submissions"):
         grade([], tmp_path)
+
+
+def test_a_second_run_at_the_same_time_is_refused(tmp_path):
+    """Otherwise points of the other run would be taken for forged ones."""
+    write_tiny_set(tmp_path)
+    with grading._alone(tmp_path), pytest.raises(ValueError, match=r"another grade is running"):
+        grade(["ps0"], tmp_path, without_box=True)
+    with pytest.raises(ValueError, match="ps0: a submission in"):
+        grade(["ps0"], tmp_path, without_box=True)
 
 
 def test_nbgrader_commands_use_the_same_configuration():
