@@ -618,6 +618,19 @@ def test_interpolated_poses_are_announced(rate, jitter):
         rb.smoothing_spline(at, looked_up, period=0.3)
 
 
+@pytest.mark.parametrize("speed", [0.003, 0.01])
+def test_rounded_poses_of_a_slow_motion_are_not_called_interpolated(speed):
+    rng, t = np.random.default_rng(4), np.arange(0, 20, 0.005)
+    x = speed * np.sin(t[:, None] + np.arange(6))
+    x[:, :3] += 1e-3 * rng.normal(size=(len(t), 3))
+    x[:, 3:] = x[:, 3:].round(3)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        rb.smoothing_spline(t, rb.pose_from_coordinates(x))
+    for each in told:  # errors of rounding are alike in neighbouring poses
+        assert "the origin seems to oscillate" in str(each.message)
+
+
 @pytest.mark.parametrize("dependence", [0, 0.5, 0.9])
 def test_dependent_errors_of_a_slow_motion_are_announced(dependence):
     rng, t = np.random.default_rng(4), np.arange(0, 10, 0.01)

@@ -179,10 +179,14 @@ def _interpolated(smoother: Smoother, poses: Array) -> str:
     """Return a warning if the poses are on straight lines between some of them, or "".
 
     The velocity jumps at one pose, or between two, and their distances are far larger than half of
-    the distances. Next to a wrong pose, three poses have such distances.
+    the distances. Next to a wrong pose, three poses have such distances. Rounded coordinates of a
+    slow motion also jump, but do not change between the jumps.
     """
-    for part, (off, _) in _from_lines(smoother, poses).items():
-        usual = max(np.median(off), ROUNDING * (1 + np.abs(poses).max()))
+    least = ROUNDING * (1 + np.abs(poses).max())
+    for part, (off, step) in _from_lines(smoother, poses).items():
+        if np.median(step) < least:
+            continue
+        usual = max(np.median(off), least)
         bent = np.pad(off > BENT * usual, 1)
         starts, stops = np.flatnonzero(bent[1:] != bent[:-1]).reshape(-1, 2).T
         peaks = np.array([off[i:k].max() for i, k in zip(starts, stops, strict=True)])
@@ -200,12 +204,14 @@ def _check_neighbours(smoother: Smoother, poses: Array) -> bool:
     """Warn if a pose is far from the line through the poses before and after it.
 
     It is far if its distance is five times the usual one near it, and larger than the usual step
-    there: where the velocity of a motion jumps, the distance is at most a step.
+    there: where the velocity of a motion jumps, the distance is at most a step. It is also larger
+    than the least step, since rounded coordinates of a slow motion jump by their last digit.
     """
     found, h = False, np.diff(smoother.knots)
     bend = h[1:] * h[:-1]  # the distance of a motion with an acceleration is bend/2 times it
     for part, (off, step) in _from_lines(smoother, poses).items():
-        usual = np.maximum(_usual_near(off), ROUNDING * (1 + np.abs(poses).max()))
+        least = max(_least(step) / OFF_LINE, ROUNDING * (1 + np.abs(poses).max()))
+        usual = np.maximum(_usual_near(off), least)
         if not (off > OFF_LINE * usual).any():
             continue
         longer = np.maximum(bend / _usual_near(bend), 1)
@@ -244,6 +250,11 @@ def _from_lines(smoother: Smoother, poses: Array) -> dict[str, tuple[Array, Arra
     return found
 
 
+def _least(step: Array) -> float:
+    """Return the least step above 0, or 0."""
+    return float(step[step > 0].min()) if step.any() else 0.0
+
+
 def _usual_near(x: Array) -> Array:
     """Return an upper bound of three quarters of the values before or after each one."""
     before, after = (np.sort(side, axis=1)[:, 3 * NEAR // 4] for side in _around(x))
@@ -276,16 +287,20 @@ def _check_noise(smoother: Smoother, periods: Any, noise: ArrayLike | None) -> N
 def _check_poses(smoother: Smoother, curve: Any, poses: Array) -> None:
     """Warn if a pose is much farther from the curve than half of the poses are.
 
-    Poses on the curve are not counted: those of a rest may have no noise.
+    Poses on the curve are not counted: those of a rest may have no noise. A wrong pose is farther
+    than the least step, since rounded coordinates of a slow motion jump by their last digit.
     """
     near = curve(smoother.knots)[smoother.which]
     turn = log(near[:, :3, :3].mT @ poses[:, :3, :3])
     errors = {"turn": turn, "origin": near[:, :3, 3:] - poses[:, :3, 3:]}
-    for (part, error), least in zip(errors.items(), smoother.is_least(curve.period), strict=False):
+    leasts = map(_least, distances(poses[:-1], poses[1:]))
+    for (part, error), step, shortest in zip(
+        errors.items(), leasts, smoother.is_least(curve.period), strict=False
+    ):
         size = np.sqrt(smoother.weights) * np.linalg.norm(error.reshape(-1, 3), axis=1)
         i, off = np.argmax(size), size > ROUNDING * (1 + np.abs(poses).max())
         usual = np.median(size[off]) if off.any() else np.inf
-        if size[i] > WRONG * usual and not least:
+        if size[i] > max(WRONG * usual, step) and not shortest:
             far = f"{part} is {size[i] / usual:.0f} times as far from the curve as usual"
             _warn_of_pose(i, far)
 
@@ -309,8 +324,8 @@ def _check_dependent(smoother: Smoother, curve: Any, poses: Array) -> None:
         if slow and LEAST_OF_SHORT < period < SHORT and (part == "origin" or step < SMALL_TURN):
             _warn(
                 f"poses: the {part} seems to oscillate within {period:.1f} steps, so errors of "
-                "neighbouring poses may be alike, as after a filter; if the body does not "
-                "oscillate, give period"
+                "neighbouring poses may be alike, as after a filter or by rounding; if the body "
+                "does not oscillate, give period"
             )
 
 
